@@ -137,13 +137,12 @@ std::optional<RangeImageView::Direction> RangeImageView::direction_of(
   const float elevation = fast_atan2(point_lidar.z(), point_lidar.head<2>().norm());
   const float turn = 0.5F * (1.0F - fast_atan2(point_lidar.y(), point_lidar.x()) / pi);
   const float row = (fov_up_ - elevation) * rows_per_rad_;
-  if (row < seen_rows_.first || row > seen_rows_.last) return std::nullopt;
-  const std::uint32_t pixel = pixel_at(row, turn * static_cast<float>(columns_), range_m);
-  if (pixel == none) return std::nullopt;
-  const int r = static_cast<int>(pixel) / columns_;
-  return Direction{.row = r,
-                   .column = static_cast<int>(pixel) - r * columns_,
-                   .below_row_top = share_of_row(row, static_cast<float>(r))};
+  const bool is_seen = range_m > 0.0F && row >= seen_rows_.first && row <= seen_rows_.last;
+  if (!is_seen) return std::nullopt;
+  const int r = std::clamp(static_cast<int>(row), 0, rows_ - 1);
+  const int c = std::clamp(static_cast<int>(turn * static_cast<float>(columns_)), 0, columns_ - 1);
+  return Direction{
+      .row = r, .column = c, .below_row_top = share_of_row(row, static_cast<float>(r))};
 }
 
 float RangeImageView::next_range_m(int row, int column, int step) const {
@@ -156,21 +155,28 @@ float RangeImageView::next_range_m(int row, int column, int step) const {
   return std::numeric_limits<float>::infinity();
 }
 
-float RangeImageView::nearest_m(const Direction& at) const {
-  float nearest_m = std::numeric_limits<float>::infinity();
-  for (int offset = -columns_beside_; offset <= columns_beside_; ++offset) {
+bool RangeImageView::column_sees_past(const Direction& at, int column, float range_m) const {
+  const std::size_t pixel = index(at.row, column);
+  const float beside_m = std::abs(pixels_[pixel]);
+  const bool has_return = beside_m > 0.0F;
+  if (has_return && beside_m <= range_m) return false;
+  const bool is_above = at.below_row_top < below_row_top_[pixel];
+  return ((has_return && !is_above) || next_range_m(at.row, column, -1) > range_m) &&
+         ((has_return && is_above) || next_range_m(at.row, column, 1) > range_m);
+}
+
+bool RangeImageView::sees_past(const Observation& point, float range_m) const {
+  const Direction& at = point.at;
+  // What ends most looks comes first: the returns in the point's own column.
+  if (!column_sees_past(at, at.column, range_m)) return false;
+  for (int offset = 1; offset <= columns_beside_; ++offset) {
     // The image is closed at the rear.
-    int column = at.column + offset;
-    if (column < 0) column += columns_;
-    if (column >= columns_) column -= columns_;
-    const std::size_t pixel = index(at.row, column);
-    const bool has_return = pixels_[pixel] != 0.0F;
-    if (has_return) nearest_m = std::min(nearest_m, std::abs(pixels_[pixel]));
-    const bool is_above = at.below_row_top < below_row_top_[pixel];
-    if (!has_return || is_above) nearest_m = std::min(nearest_m, next_range_m(at.row, column, -1));
-    if (!has_return || !is_above) nearest_m = std::min(nearest_m, next_range_m(at.row, column, 1));
+    const int left = at.column - offset < 0 ? at.column - offset + columns_ : at.column - offset;
+    const int right =
+        at.column + offset < columns_ ? at.column + offset : at.column + offset - columns_;
+    if (!column_sees_past(at, left, range_m) || !column_sees_past(at, right, range_m)) return false;
   }
-  return nearest_m;
+  return true;
 }
 
 std::optional<RangeImageView::Observation> RangeImageView::observe(
@@ -184,8 +190,8 @@ std::optional<RangeImageView::Observation> RangeImageView::observe(
   if (pixel == 0.0F) return std::nullopt;
   observation.range_m = std::abs(pixel);
   observation.movable = pixel > 0.0F;
-  observation.nearest_m = nearest_m(*at);
   observation.direction_map = (point_map - origin_map_) / observation.point_range_m;
+  observation.at = *at;
   return observation;
 }
 

@@ -20,20 +20,27 @@ class RangeImageView {
   RangeImageView(const Scan& scan, std::span<const SemanticClass> labels, const SensorModel& sensor,
                  const Eigen::Isometry3d& T_map_lidar);
 
+  /// Where a point is in the image.
+  struct Direction {
+    int row, column;
+    std::uint8_t below_row_top;
+  };
   /// What was measured in the direction of a point.
   struct Observation {
     float range_m;
-    /// Smallest range in the pixels around: of the beams that pass above and below the point, and
-    /// as far to the sides as rows are apart, one column at least.
-    float nearest_m;
     bool movable;
     /// From this view's lidar to the point [m].
     float point_range_m;
     Eigen::Vector3f direction_map;
+    Direction at;
   };
   /// Empty where nothing was measured, and beyond the outermost beams: half a row below the lowest
   /// one the ground is already nearer than what that one hit.
   [[nodiscard]] std::optional<Observation> observe(const Eigen::Vector3f& point_map) const;
+
+  /// Whether all returns around a point are farther than a range: those of the beams that pass
+  /// above and below it, as far to the sides as rows are apart, one column at least.
+  [[nodiscard]] bool sees_past(const Observation& point, float range_m) const;
 
   [[nodiscard]] const Eigen::Vector3f& origin_map() const { return origin_map_; }
 
@@ -63,11 +70,6 @@ class RangeImageView {
     const int c = std::clamp(static_cast<int>(is_seen ? column : 0.0F), 0, columns_ - 1);
     return is_seen ? static_cast<std::uint32_t>(r * columns_ + c) : none;
   }
-  /// Where a point is in the image.
-  struct Direction {
-    int row, column;
-    std::uint8_t below_row_top;
-  };
   [[nodiscard]] std::optional<Direction> direction_of(const Eigen::Vector3f& point_lidar,
                                                       float range_m) const;
   [[nodiscard]] std::size_t index(int row, int column) const {
@@ -76,7 +78,8 @@ class RangeImageView {
   /// Of the next row up (-1) or down (1) that measured something in a column, or the next but one;
   /// else infinite.
   [[nodiscard]] float next_range_m(int row, int column, int step) const;
-  [[nodiscard]] float nearest_m(const Direction& at) const;
+  /// Whether the beams above and below a point see past a range in a column.
+  [[nodiscard]] bool column_sees_past(const Direction& at, int column, float range_m) const;
 
   int rows_;
   int columns_;

@@ -144,8 +144,8 @@ bool StaticMap::State::sees_through(const RangeImageView& view,
   if (range_m > config.clearing_range_m) return false;
   const auto observation = view.observe(position_map);
   const double margin_m = std::max(config.clearing_margin_m, config.voxel_size_m);
-  return observation &&
-         observation->nearest_m > range_m + margin_m + config.clearing_margin_share * range_m;
+  const double beyond_m = range_m + margin_m + config.clearing_margin_share * range_m;
+  return observation && view.sees_past(*observation, static_cast<float>(beyond_m));
 }
 
 std::uint32_t StaticMap::State::times_free(const Eigen::Vector3f& position_map) const {

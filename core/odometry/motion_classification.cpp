@@ -99,7 +99,7 @@ PastObservation RangeImageHistory::observation(std::size_t age, const Eigen::Vec
   const RangeImageView& past = views_[views_.size() - (age + 1) * interval];
   const auto observation = past.observe(point_map);
   if (!observation) return PastObservation::unknown;
-  if (observation->nearest_m > observation->point_range_m + margin(observation->point_range_m))
+  if (past.sees_past(*observation, observation->point_range_m + margin(observation->point_range_m)))
     return PastObservation::free;
   if (!observation->movable) return PastObservation::unknown;
   if (std::abs(observation->range_m - observation->point_range_m) < same_surface_m)
@@ -115,8 +115,8 @@ PastObservation RangeImageHistory::observation(std::size_t age, const Eigen::Vec
 bool RangeImageHistory::sees_through(const RangeImageView& view,
                                      const Eigen::Vector3f& point_map) const {
   const auto observation = view.observe(point_map);
-  return observation &&
-         observation->nearest_m > observation->point_range_m + margin(observation->point_range_m);
+  return observation && view.sees_past(*observation, observation->point_range_m +
+                                                         margin(observation->point_range_m));
 }
 
 void RangeImageHistory::add(RangeImageView view) {

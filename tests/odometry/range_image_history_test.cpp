@@ -130,7 +130,8 @@ TEST(RangeImageView, SeesThePointsOfItsScan) {
     ASSERT_TRUE(look) << i;
     EXPECT_NEAR(look->range_m, look->point_range_m, 0.02F);
     EXPECT_EQ(look->movable, seen.scan.labels[i] == SemanticClass::car);
-    EXPECT_LE(look->nearest_m, look->range_m);
+    EXPECT_FALSE(from_here.sees_past(*look, look->range_m));
+    EXPECT_TRUE(from_here.sees_past(*look, 0.1F));
   }
 }
 
