@@ -229,7 +229,7 @@ OdometryResult Odometry::State::find_pose(ScanInParts& parts, const PosePredicti
   if (!parts.few_surfaces.empty()) {
     std::swap(parts.features.surfaces, parts.few_surfaces);
     features = registered_features(parts, config);
-    const OdometryResult found = register_features(features, map, prediction.T_map_lidar, config);
+    const OdometryResult found = search_near_prediction(features, map, prediction, fits, method());
     if (fits.fits(found) && fits.believes(found)) return found;
     std::swap(parts.features.surfaces, parts.few_surfaces);
   }

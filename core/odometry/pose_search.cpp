@@ -428,6 +428,18 @@ bool is_foretold(const OdometryResult& found, const FeatureSets& features, const
          confirmed_by_points(found, features, map, config).health == OdometryHealth::good;
 }
 
+OdometryResult search_near_prediction(const FeatureSets& features, const LocalMap& map,
+                                      const PosePrediction& prediction, const FitStatistics& fits,
+                                      const OdometryConfig& config) {
+  constexpr bool is_first_motion = false;
+  const Eigen::Isometry3d& T_map_lidar = prediction.T_map_lidar;
+  BestStart best(T_map_lidar, is_first_motion, features, map, fits, config);
+  if (best.take(register_features(features, map, T_map_lidar, config)) || config.paper_exact)
+    return best.result();
+  best.take(register_in_two_stages(features, map, T_map_lidar, config));
+  return best.result();
+}
+
 OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,
                            const RegisteredScan& last, const PosePrediction& prediction,
                            const FitStatistics& fits, const OdometryConfig& config) {

@@ -111,6 +111,14 @@ struct PosePrediction {
                                const LocalMap& map, const PosePrediction& prediction,
                                const FitStatistics& fits, const OdometryConfig& config);
 
+/// From the prediction alone, in two stages where that does not fit: for few features, before all
+/// are looked at. The better of both.
+[[nodiscard]] OdometryResult search_near_prediction(const FeatureSets& features,
+                                                    const LocalMap& map,
+                                                    const PosePrediction& prediction,
+                                                    const FitStatistics& fits,
+                                                    const OdometryConfig& config);
+
 /// All starts that may lead to the pose, the cheapest first, until one fits.
 [[nodiscard]] OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,
                                          const RegisteredScan& last,
