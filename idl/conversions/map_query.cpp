@@ -1,6 +1,7 @@
 #include "idl/conversions/map_query.hpp"
 
 #include <algorithm>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -63,16 +64,38 @@ TileChange from_wire(const stillmap_msgs::msg::TileChange& message) {
           .voxel_count = message.voxel_count()};
 }
 
-std::vector<QueryVoxel> voxels_of(const stillmap_msgs::msg::Voxels& voxels) {
-  std::vector<QueryVoxel> out;
-  out.reserve(voxels.x().size());
-  for (std::size_t i = 0; i < voxels.x().size(); ++i) {
-    out.push_back({.position_map = {voxels.x()[i], voxels.y()[i], voxels.z()[i]},
-                   .label = static_cast<SemanticClass>(voxels.label()[i]),
-                   .confidence = voxels.confidence()[i],
-                   .point_count = voxels.point_count()[i]});
+// Spans, since a message's accessors are calls, one for each element.
+std::vector<QueryVoxel> voxels_of(const stillmap_msgs::msg::Voxels& message) {
+  const std::span x(message.x()), y(message.y()), z(message.z());
+  const std::span label(message.label());
+  const std::span confidence(message.confidence());
+  const std::span point_count(message.point_count());
+  std::vector<QueryVoxel> voxels;
+  voxels.reserve(x.size());
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    voxels.push_back({.position_map = {x[i], y[i], z[i]},
+                      .label = static_cast<SemanticClass>(label[i]),
+                      .confidence = confidence[i],
+                      .point_count = point_count[i]});
   }
-  return out;
+  return voxels;
+}
+
+void set_voxels(std::span<const QueryVoxel> voxels, stillmap_msgs::msg::Voxels& message) {
+  resize(message, voxels.size());
+  const std::span x(message.x()), y(message.y()), z(message.z());
+  const std::span label(message.label());
+  const std::span confidence(message.confidence());
+  const std::span point_count(message.point_count());
+  for (std::size_t i = 0; i < voxels.size(); ++i) {
+    const QueryVoxel& voxel = voxels[i];
+    x[i] = voxel.position_map.x();
+    y[i] = voxel.position_map.y();
+    z[i] = voxel.position_map.z();
+    label[i] = static_cast<std::uint8_t>(voxel.label);
+    confidence[i] = voxel.confidence;
+    point_count[i] = voxel.point_count;
+  }
 }
 
 }  // namespace
@@ -128,17 +151,7 @@ GetStaticMap_Response to_response(const MapQueryResult& result) {
   GetStaticMap_Response response;
   response.status(to_reply_status(static_cast<ReplyCode>(result.status), result.reason,
                                   result.map_version, result.map_id));
-  auto& voxels = response.voxels();
-  resize(voxels, result.voxels.size());
-  for (std::size_t i = 0; i < result.voxels.size(); ++i) {
-    const QueryVoxel& voxel = result.voxels[i];
-    voxels.x()[i] = voxel.position_map.x();
-    voxels.y()[i] = voxel.position_map.y();
-    voxels.z()[i] = voxel.position_map.z();
-    voxels.label()[i] = static_cast<std::uint8_t>(voxel.label);
-    voxels.confidence()[i] = voxel.confidence;
-    voxels.point_count()[i] = voxel.point_count;
-  }
+  set_voxels(result.voxels, response.voxels());
   response.total_voxels(result.total_voxels);
   for (const TileChange& tile : result.tiles) response.tiles().push_back(to_wire(tile));
   response.continuation(result.continuation);

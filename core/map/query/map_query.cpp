@@ -42,13 +42,14 @@ class VoxelFilter {
            (matches_all_classes_ ||
             query_.classes.test(static_cast<std::size_t>(evidence.winner())));
   }
-  /// How many of the tile's voxels it matches.
-  [[nodiscard]] std::uint32_t count(const Tile& tile) const {
+  /// How many of the tile's voxels it matches, from the `begin`-th on.
+  [[nodiscard]] std::uint32_t count(const Tile& tile, std::size_t begin) const {
+    const std::span<const PackedVoxel> voxels = tile.voxels.packed().subspan(begin);
+    if (matches_all()) return static_cast<std::uint32_t>(voxels.size());
     const VoxelGrid grid = tile.voxels.grid();
-    return static_cast<std::uint32_t>(
-        std::ranges::count_if(tile.voxels.packed(), [&](const PackedVoxel& voxel) {
-          return matches(mean_map(voxel, tile.info.id, grid), voxel.evidence);
-        }));
+    return static_cast<std::uint32_t>(std::ranges::count_if(voxels, [&](const PackedVoxel& voxel) {
+      return matches(mean_map(voxel, tile.info.id, grid), voxel.evidence);
+    }));
   }
 
  private:
@@ -87,29 +88,6 @@ TilePointers selected_tiles(const MapSnapshot& view, const MapQuery& query,
   return selected;
 }
 
-/// The tiles of an answer; `selected` as selected_tiles returns it.
-std::vector<TileChange> tile_changes(const MapSnapshot& view, const MapQuery& query,
-                                     const RegionShape& region, const TilePointers& selected,
-                                     const TileHistory* history, TileReader& reader) {
-  std::vector<TileChange> changes;
-  changes.reserve(selected.size());
-  for (const auto& tile : selected) {
-    const TileInfo& info = tile->info;
-    const VoxelFilter filter(query, region, *tile);
-    const std::uint32_t count =
-        filter.matches_all() ? info.voxel_count : filter.count(*reader.read(tile));
-    changes.push_back({info.id, kind_of(info, query, history), info.revision, count});
-  }
-  if (!query.since || history == nullptr) return changes;
-  for (const auto& [id, version] : history->removed) {
-    if (version > query.since->version &&
-        region.may_intersect(tile_footprint(id, view.tile_size_m))) {
-      changes.push_back({id, TileChangeKind::removed, version, 0});
-    }
-  }
-  return changes;
-}
-
 /// A valid query, and what its answer is read from.
 struct Selection {
   const MapSnapshot& view;
@@ -119,29 +97,87 @@ struct Selection {
   TileReader& reader;
 };
 
+std::uint64_t voxel_count(const TilePointers& tiles) {
+  std::uint64_t count = 0;
+  for (const auto& tile : tiles) count += tile->info.voxel_count;
+  return count;
+}
+
+/// Adds the voxels that a filter matches to a page, from the `begin`-th on. Returns the first of
+/// them for which the page has no room; else the number of voxels.
+std::size_t add_voxels(const Tile& tile, const VoxelFilter& filter, std::size_t begin,
+                       std::size_t max_voxels, std::vector<QueryVoxel>& page) {
+  const std::span<const PackedVoxel> voxels = tile.voxels.packed();
+  const VoxelGrid grid = tile.voxels.grid();
+  for (std::size_t v = begin; v < voxels.size(); ++v) {
+    const PackedVoxel& voxel = voxels[v];
+    const Eigen::Vector3f mean = mean_map(voxel, tile.info.id, grid);
+    if (!filter.matches(mean, voxel.evidence)) continue;
+    if (page.size() == max_voxels) return v;
+    page.push_back({mean, voxel.evidence.winner(), voxel.evidence.share(), voxel.point_count});
+  }
+  return voxels.size();
+}
+
+std::size_t page_size(const MapQuery& query) { return query.max_bytes / query_voxel_bytes; }
+
 /// A page of the map's own voxels from `position` on. Advances `position` to the first voxel of the
 /// next page; true when there is one.
 bool fill_page(const Selection& from, Continuation& position, std::vector<QueryVoxel>& page) {
-  const std::size_t page_size = from.query.max_bytes / query_voxel_bytes;
-  for (std::size_t i = position.tile; i < from.tiles.size(); ++i) {
-    const auto read = from.reader.read(from.tiles[i]);
-    const Tile& tile = *read;
-    const VoxelFilter filter(from.query, from.region, tile);
-    const std::span<const PackedVoxel> voxels = tile.voxels.packed();
-    const VoxelGrid grid = tile.voxels.grid();
-    for (std::size_t v = i == position.tile ? position.voxel : 0; v < voxels.size(); ++v) {
-      const PackedVoxel& voxel = voxels[v];
-      const Eigen::Vector3f mean = mean_map(voxel, tile.info.id, grid);
-      if (!filter.matches(mean, voxel.evidence)) continue;
-      if (page.size() == page_size) {
-        position.tile = i;
-        position.voxel = v;
-        return true;
-      }
-      page.push_back({mean, voxel.evidence.winner(), voxel.evidence.share(), voxel.point_count});
-    }
+  for (; position.tile < from.tiles.size(); ++position.tile, position.voxel = 0) {
+    const auto tile = from.reader.read(from.tiles[position.tile]);
+    const VoxelFilter filter(from.query, from.region, *tile);
+    position.voxel = add_voxels(*tile, filter, position.voxel, page_size(from.query), page);
+    if (position.voxel < tile->voxels.size()) return true;
   }
   return false;
+}
+
+/// The same for an answer's first page. Returns how many voxels the answer has of each tile.
+std::vector<std::uint32_t> fill_first_page(const Selection& from, Continuation& position,
+                                           std::vector<QueryVoxel>& page, bool& has_more) {
+  std::vector<std::uint32_t> counts;
+  counts.reserve(from.tiles.size());
+  page.reserve(std::min<std::uint64_t>(page_size(from.query), voxel_count(from.tiles)));
+  for (const auto& selected : from.tiles) {
+    const VoxelFilter filter(from.query, from.region, *selected);
+    if (has_more && filter.matches_all()) {
+      counts.push_back(selected->info.voxel_count);
+      continue;
+    }
+    const auto tile = from.reader.read(selected);
+    const std::size_t before = page.size();
+    const std::size_t end =
+        has_more ? 0 : add_voxels(*tile, filter, 0, page_size(from.query), page);
+    counts.push_back(static_cast<std::uint32_t>(page.size() - before) + filter.count(*tile, end));
+    if (!has_more && end < tile->voxels.size()) {
+      has_more = true;
+      position.tile = counts.size() - 1;
+      position.voxel = end;
+    }
+  }
+  return counts;
+}
+
+/// The tiles of an answer that has so many voxels of each, and those that are gone.
+std::vector<TileChange> tile_changes(const Selection& from,
+                                     std::span<const std::uint32_t> voxel_counts,
+                                     const TileHistory* history) {
+  std::vector<TileChange> changes;
+  changes.reserve(from.tiles.size());
+  for (std::size_t i = 0; i < from.tiles.size(); ++i) {
+    const TileInfo& info = from.tiles[i]->info;
+    changes.push_back(
+        {info.id, kind_of(info, from.query, history), info.revision, voxel_counts[i]});
+  }
+  if (!from.query.since || history == nullptr) return changes;
+  for (const auto& [id, version] : history->removed) {
+    if (version > from.query.since->version &&
+        from.region.may_intersect(tile_footprint(id, from.view.tile_size_m))) {
+      changes.push_back({id, TileChangeKind::removed, version, 0});
+    }
+  }
+  return changes;
 }
 
 /// The cells of one strip of a coarser answer, merged from the tiles that reach into it.
@@ -167,19 +203,12 @@ std::uint64_t voxel_count(const Selection& from, std::span<const std::size_t> ti
   return count;
 }
 
-std::uint64_t voxel_count(const TilePointers& tiles) {
-  std::uint64_t count = 0;
-  for (const auto& tile : tiles) count += tile->info.voxel_count;
-  return count;
-}
-
 /// A page of a coarser answer. The answer is made strip by strip, so that a page merges its own
 /// part of the region and ends when that is much; the first page counts the rest where it is
 /// little.
 bool fill_coarse_page(const Selection& from, Continuation& position,
                       std::vector<QueryVoxel>& page) {
   const CoarseStrips strips(from.tiles, from.query.resolution_m, from.view.tile_size_m);
-  const std::size_t page_size = from.query.max_bytes / query_voxel_bytes;
   const bool is_first = from.query.continuation.empty();
   if (is_first) position.total_voxels = voxel_count(from.tiles);
   const bool counts = is_first && position.total_voxels <= max_merged_voxels;
@@ -198,7 +227,8 @@ bool fill_coarse_page(const Selection& from, Continuation& position,
     if (has_more) continue;
     const std::size_t begin =
         strip == position.tile ? std::min<std::size_t>(position.voxel, cells.size()) : 0;
-    const std::size_t end = begin + std::min(cells.size() - begin, page_size - page.size());
+    const std::size_t end =
+        begin + std::min(cells.size() - begin, page_size(from.query) - page.size());
     page.insert(page.end(), cells.begin() + static_cast<std::ptrdiff_t>(begin),
                 cells.begin() + static_cast<std::ptrdiff_t>(end));
     if (end < cells.size()) {
@@ -269,12 +299,16 @@ std::optional<Refusal> size_refusal(const Selection& from) {
   return Refusal{QueryStatus::invalid_request, reason.str()};
 }
 
-/// Fills in the tiles and the number of voxels of the whole answer, for its first page.
-void add_tiles(const Selection& selection, const TileHistory* history, Continuation& position,
-               MapQueryResult& result) {
-  result.tiles = tile_changes(selection.view, selection.query, selection.region, selection.tiles,
-                              history, selection.reader);
+/// A page of an answer with the map's own voxels. The first one has the tiles and the number of
+/// voxels of the whole answer. True when there are more.
+bool add_page(const Selection& from, const TileHistory* history, Continuation& position,
+              MapQueryResult& result) {
+  if (!from.query.continuation.empty()) return fill_page(from, position, result.voxels);
+  bool has_more = false;
+  const auto counts = fill_first_page(from, position, result.voxels, has_more);
+  result.tiles = tile_changes(from, counts, history);
   for (const TileChange& tile : result.tiles) position.total_voxels += tile.voxel_count;
+  return has_more;
 }
 
 }  // namespace
@@ -287,17 +321,15 @@ MapQueryResult query_map(const MapSnapshot& view, const MapQuery& query, const T
   const RegionShape region(query.region);
   const Selection selection{view, query, region, selected_tiles(view, query, region), reader};
   const bool is_coarse = is_coarser_than_map(view, query.resolution_m);
-  const bool counts_tiles = !is_coarse && query.continuation.empty();
   if (is_coarse) {
     refusal = coarseness_refusal(selection);
-  } else if (counts_tiles) {
+  } else if (query.continuation.empty()) {
     refusal = size_refusal(selection);
   }
   if (refusal) return result_of(view, refusal->status, std::move(refusal->reason));
   MapQueryResult result = result_of(view, QueryStatus::ok, {});
-  if (counts_tiles) add_tiles(selection, history, position, result);
   const bool has_more = is_coarse ? fill_coarse_page(selection, position, result.voxels)
-                                  : fill_page(selection, position, result.voxels);
+                                  : add_page(selection, history, position, result);
   result.total_voxels = position.total_voxels;
   if (has_more) result.continuation = to_token(position);
   return result;
