@@ -1,6 +1,7 @@
 // Coarser answers of regions that are much larger than a page.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <map>
 #include <random>
 #include <set>
@@ -20,7 +21,7 @@ class CountingTileStore : public TileStore {
     ++loads;
     return {tiles_.find(id), nullptr};
   }
-  std::size_t loads = 0;
+  std::atomic<std::size_t> loads = 0;
 
  private:
   TileTable tiles_;

@@ -8,7 +8,7 @@ namespace stillmap {
 namespace {
 
 /// A strip takes whole rows of tiles until it has so many.
-constexpr std::size_t min_tiles = 64;
+constexpr std::size_t min_tiles = 4;
 
 }  // namespace
 

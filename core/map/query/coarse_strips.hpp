@@ -10,9 +10,9 @@
 
 namespace stillmap {
 
-/// The tiles of a coarser answer in strips across x, each a whole number of cells wide and of some
-/// dozens of tiles: merged one after the other, strips give the answer's cells in their order, and
-/// none needs more than its own tiles.
+/// The tiles of a coarser answer in strips across x, each a whole number of cells wide and of whole
+/// rows of tiles: merged one after the other or beside each other, strips give the answer's cells
+/// in their order, and none needs more than its own tiles.
 class CoarseStrips {
  public:
   /// `tiles` are sorted by id; `resolution_m` is not finer than the map's voxels.
@@ -24,9 +24,12 @@ class CoarseStrips {
   [[nodiscard]] const std::vector<std::size_t>& tiles(std::size_t strip) const {
     return strips_[strip].tiles;
   }
+  /// Whether the cells of all means with x between these (map frame [m]) lie in the strip.
+  [[nodiscard]] bool covers(std::size_t strip, float min_x_map, float max_x_map) const {
+    return is_in(strip, min_x_map) && is_in(strip, max_x_map);
+  }
   /// Whether the cell of a mean (map frame [m]) lies in the strip.
   [[nodiscard]] bool is_in(std::size_t strip, float x_map) const {
-    if (strips_.size() == 1) return true;
     const double cell = cell_of(x_map);
     return cell >= strips_[strip].first_cell && cell <= strips_[strip].last_cell;
   }

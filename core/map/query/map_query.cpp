@@ -1,7 +1,10 @@
 #include "core/map/query/map_query.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cstddef>
+#include <numeric>
 #include <span>
 #include <sstream>
 #include <vector>
@@ -133,12 +136,30 @@ bool fill_page(const Selection& from, Continuation& position, std::vector<QueryV
   return false;
 }
 
-/// The same for an answer's first page. Returns how many voxels the answer has of each tile.
+/// The page of an answer of which all fits in one, tiles beside each other. Returns how many voxels
+/// the answer has of each.
+std::vector<std::uint32_t> fill_only_page(const Selection& from, std::vector<QueryVoxel>& page) {
+  std::vector<std::vector<QueryVoxel>> voxels(from.tiles.size());
+  tbb::parallel_for(std::size_t{0}, from.tiles.size(), [&](std::size_t i) {
+    const auto tile = from.reader.read(from.tiles[i]);
+    const VoxelFilter filter(from.query, from.region, *tile);
+    if (filter.matches_all()) voxels[i].reserve(tile->voxels.size());
+    add_voxels(*tile, filter, 0, page_size(from.query), voxels[i]);
+  });
+  std::vector<std::uint32_t> counts;
+  counts.reserve(voxels.size());
+  for (const auto& of_tile : voxels) counts.push_back(static_cast<std::uint32_t>(of_tile.size()));
+  page.reserve(std::reduce(counts.begin(), counts.end(), std::size_t{0}));
+  for (const auto& of_tile : voxels) page.insert(page.end(), of_tile.begin(), of_tile.end());
+  return counts;
+}
+
+/// An answer's first page, of several. Returns how many voxels the answer has of each tile.
 std::vector<std::uint32_t> fill_first_page(const Selection& from, Continuation& position,
                                            std::vector<QueryVoxel>& page, bool& has_more) {
   std::vector<std::uint32_t> counts;
   counts.reserve(from.tiles.size());
-  page.reserve(std::min<std::uint64_t>(page_size(from.query), voxel_count(from.tiles)));
+  page.reserve(page_size(from.query));
   for (const auto& selected : from.tiles) {
     const VoxelFilter filter(from.query, from.region, *selected);
     if (has_more && filter.matches_all()) {
@@ -188,9 +209,11 @@ std::vector<QueryVoxel> merge(const Selection& from, const CoarseStrips& strips,
     const auto tile = from.reader.read(from.tiles[i]);
     const VoxelFilter filter(from.query, from.region, *tile);
     const VoxelGrid grid = tile->voxels.grid();
+    const Eigen::AlignedBox3f& bounds_map = tile->info.bounds_map;
+    const bool is_whole = strips.covers(strip, bounds_map.min().x(), bounds_map.max().x());
     for (const PackedVoxel& voxel : tile->voxels.packed()) {
       const Eigen::Vector3f mean = mean_map(voxel, tile->info.id, grid);
-      if (strips.is_in(strip, mean.x()) && filter.matches(mean, voxel.evidence))
+      if ((is_whole || strips.is_in(strip, mean.x())) && filter.matches(mean, voxel.evidence))
         cells.add(mean, voxel.point_count, voxel.evidence);
     }
   }
@@ -201,6 +224,34 @@ std::uint64_t voxel_count(const Selection& from, std::span<const std::size_t> ti
   std::uint64_t count = 0;
   for (const std::size_t i : tiles) count += from.tiles[i]->info.voxel_count;
   return count;
+}
+
+/// Adds a strip's cells to a page, from the `begin`-th on; false, with the first that has no room
+/// there, where the page is full.
+bool add_cells(const std::vector<QueryVoxel>& cells, std::size_t& begin, std::size_t max_cells,
+               std::vector<QueryVoxel>& page) {
+  begin = std::min(begin, cells.size());
+  const std::size_t end = begin + std::min(cells.size() - begin, max_cells - page.size());
+  page.insert(page.end(), cells.begin() + static_cast<std::ptrdiff_t>(begin),
+              cells.begin() + static_cast<std::ptrdiff_t>(end));
+  begin = end;
+  return end == cells.size();
+}
+
+/// Cells of some strips, from one on, merged beside each other: of one at least, and of no more
+/// voxels than there may be cells, so that nothing is merged for a later page.
+std::vector<std::vector<QueryVoxel>> merge_some(const Selection& from, const CoarseStrips& strips,
+                                                std::size_t first, std::uint64_t max_cells,
+                                                std::uint64_t& merged) {
+  std::uint64_t voxels = 0;
+  std::size_t end = first;
+  do voxels += voxel_count(from, strips.tiles(end++));
+  while (end < strips.size() && voxels + voxel_count(from, strips.tiles(end)) <= max_cells);
+  merged += voxels;
+  std::vector<std::vector<QueryVoxel>> cells(end - first);
+  tbb::parallel_for(first, end,
+                    [&](std::size_t strip) { cells[strip - first] = merge(from, strips, strip); });
+  return cells;
 }
 
 /// A page of a coarser answer. The answer is made strip by strip, so that a page merges its own
@@ -215,27 +266,26 @@ bool fill_coarse_page(const Selection& from, Continuation& position,
   std::uint64_t total = 0;
   std::uint64_t merged = 0;
   bool has_more = false;
-  for (std::size_t strip = position.tile; strip < strips.size(); ++strip) {
+  std::size_t begin = position.voxel;
+  for (std::size_t strip = position.tile; strip < strips.size();) {
     if (merged >= max_merged_voxels && !counts) {
       position.tile = strip;
       position.voxel = 0;
       return true;
     }
-    merged += voxel_count(from, strips.tiles(strip));
-    const std::vector<QueryVoxel> cells = merge(from, strips, strip);
-    total += cells.size();
-    if (has_more) continue;
-    const std::size_t begin =
-        strip == position.tile ? std::min<std::size_t>(position.voxel, cells.size()) : 0;
-    const std::size_t end =
-        begin + std::min(cells.size() - begin, page_size(from.query) - page.size());
-    page.insert(page.end(), cells.begin() + static_cast<std::ptrdiff_t>(begin),
-                cells.begin() + static_cast<std::ptrdiff_t>(end));
-    if (end < cells.size()) {
-      has_more = true;
-      position.tile = strip;
-      position.voxel = end;
-      if (!counts) return true;
+    // What is counted is merged in any case.
+    const std::uint64_t max_cells =
+        counts ? max_merged_voxels : page_size(from.query) - page.size();
+    for (const auto& cells : merge_some(from, strips, strip, max_cells, merged)) {
+      total += cells.size();
+      if (!has_more && !add_cells(cells, begin, page_size(from.query), page)) {
+        has_more = true;
+        position.tile = strip;
+        position.voxel = begin;
+        if (!counts) return true;
+      }
+      begin = 0;
+      ++strip;
     }
   }
   if (counts) position.total_voxels = total;
@@ -305,7 +355,9 @@ bool add_page(const Selection& from, const TileHistory* history, Continuation& p
               MapQueryResult& result) {
   if (!from.query.continuation.empty()) return fill_page(from, position, result.voxels);
   bool has_more = false;
-  const auto counts = fill_first_page(from, position, result.voxels, has_more);
+  const auto counts = voxel_count(from.tiles) <= page_size(from.query)
+                          ? fill_only_page(from, result.voxels)
+                          : fill_first_page(from, position, result.voxels, has_more);
   result.tiles = tile_changes(from, counts, history);
   for (const TileChange& tile : result.tiles) position.total_voxels += tile.voxel_count;
   return has_more;

@@ -28,7 +28,7 @@ struct MapQuery {
   /// Voxel size of the answer [m]; 0 is the map's own. Finer than the map's own is refused.
   double resolution_m = 0.0;
   /// Largest size of a page's voxels in bytes; at least one voxel's.
-  std::uint32_t max_bytes = 1'000'000;
+  std::uint32_t max_bytes = 4'000'000;
   /// Only tiles that changed since, at the map's own resolution.
   std::optional<KnownVersion> since;
   /// Where the last page ended; empty for the first page.
@@ -98,7 +98,8 @@ inline constexpr std::size_t query_voxel_bytes = 3 * sizeof(float) + 1 + sizeof(
 /// and so are some of the voxels of each of more than 10,000 tiles. A page may end early, even
 /// without a voxel, where it took much work.
 /// `history` ends with this view; only the first page of a query with `since` needs it, and is
-/// refused without. Non-resident tiles are read through `reader`, one at a time; throws as it does.
+/// refused without. Non-resident tiles are read through `reader`, and some of them at once; throws
+/// as it does.
 [[nodiscard]] MapQueryResult query_map(const MapSnapshot& view, const MapQuery& query,
                                        const TileHistory* history, TileReader& reader);
 /// For a view without non-resident tiles.
