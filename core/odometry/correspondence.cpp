@@ -13,8 +13,6 @@ constexpr int min_neighbours = 5;
 constexpr double line_dominance = 3.0;
 /// No neighbour lies farther from its plane than this [m] (A-LOAM).
 constexpr double plane_thickness_m = 0.2;
-/// Neighbours nearly on one line do not say how their plane is turned about it.
-constexpr double min_plane_width_share = 0.1;
 /// A line is an edge when it crosses the rings at an angle with at least this sine.
 constexpr double min_sine_to_ring = 0.5;
 
@@ -66,7 +64,7 @@ Eigen::Vector3d null_vector(const Eigen::Matrix3d& m) {
 
 /// The normal of what is flat and spread in two directions, by its covariance; no trigonometry, as
 /// a general solver has it.
-std::optional<Eigen::Vector3d> normal_of(const Eigen::Matrix3d& covariance) {
+std::optional<Eigen::Vector3d> normal_of(const Eigen::Matrix3d& covariance, double min_width) {
   constexpr double least_length = 1e-9;
   const double trace = covariance.trace();
   if (!(trace > 0.0)) return std::nullopt;
@@ -78,7 +76,7 @@ std::optional<Eigen::Vector3d> normal_of(const Eigen::Matrix3d& covariance) {
   const double sum = 1.0 - smallest;
   const double product = minors - smallest * sum;
   const double largest = 0.5 * (sum + std::sqrt(std::max(0.0, sum * sum - 4.0 * product)));
-  if (!(sum - largest > min_plane_width_share * largest)) return std::nullopt;
+  if (!(sum - largest > min_width * largest)) return std::nullopt;
   const Eigen::Vector3d normal = null_vector(m - smallest * Eigen::Matrix3d::Identity());
   const double length = normal.norm();
   if (!(length > least_length)) return std::nullopt;
@@ -94,8 +92,9 @@ std::optional<FittedSurface> line_of(const Moments& moments) {
       moments.centre, {solver.eigenvectors().col(0), solver.eigenvectors().col(1)}, 2};
 }
 
-std::optional<FittedSurface> plane_of(const Moments& moments, const Neighbours& neighbours) {
-  const std::optional<Eigen::Vector3d> normal = normal_of(moments.covariance);
+std::optional<FittedSurface> plane_of(const Moments& moments, const Neighbours& neighbours,
+                                      double min_width) {
+  const std::optional<Eigen::Vector3d> normal = normal_of(moments.covariance, min_width);
   if (!normal) return std::nullopt;
   for (std::size_t k = 0; k < static_cast<std::size_t>(neighbours.count); ++k) {
     const Eigen::Vector3d d = neighbours.points[k].position_map.cast<double>() - moments.centre;
@@ -111,15 +110,15 @@ std::optional<FittedSurface> fit_line(const Neighbours& neighbours) {
   return line_of(moments_of(neighbours));
 }
 
-std::optional<FittedSurface> fit_plane(const Neighbours& neighbours) {
+std::optional<FittedSurface> fit_plane(const Neighbours& neighbours, double min_width) {
   if (neighbours.count < min_neighbours) return std::nullopt;
-  return plane_of(moments_of(neighbours), neighbours);
+  return plane_of(moments_of(neighbours), neighbours, min_width);
 }
 
-std::optional<FittedSurface> fit_surface(const Neighbours& neighbours) {
+std::optional<FittedSurface> fit_surface(const Neighbours& neighbours, double min_plane_width) {
   if (neighbours.count < min_neighbours) return std::nullopt;
   const Moments moments = moments_of(neighbours);
-  if (auto plane = plane_of(moments, neighbours)) return plane;
+  if (auto plane = plane_of(moments, neighbours, min_plane_width)) return plane;
   return line_of(moments);
 }
 

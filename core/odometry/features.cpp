@@ -366,6 +366,13 @@ bool is_registered_by_surfaces(const SensorModel& sensor, const OdometryConfig& 
   return !config.paper_exact && sensor.rings >= config.features.min_surface_rings;
 }
 
+bool has_sparse_rings(const SensorModel& sensor) {
+  // Of 16 rings over 30 degrees, not of 32 over 41.
+  constexpr double min_spacing_rad = 1.5 * std::numbers::pi / 180.0;
+  return sensor.pattern != ScanPattern::irregular &&
+         sensor.fov_up - sensor.fov_down >= min_spacing_rad * sensor.rings;
+}
+
 Features extract_surfaces(const Scan& scan, const FeatureConfig& config) {
   std::vector<std::uint32_t> all(scan.size());
   std::iota(all.begin(), all.end(), 0U);

@@ -33,6 +33,9 @@ struct Features {
 [[nodiscard]] bool is_registered_by_surfaces(const SensorModel& sensor,
                                              const OdometryConfig& config);
 
+/// Whether a lidar's rings are so far apart that the nearest points of one mostly are its own.
+[[nodiscard]] bool has_sparse_rings(const SensorModel& sensor);
+
 /// All points of a scan without rings, thinned: `planes` and `surfaces`.
 [[nodiscard]] Features extract_surfaces(const Scan& scan, const FeatureConfig& config);
 

@@ -16,6 +16,7 @@
 #include "core/odometry/pose_search.hpp"
 #include "core/odometry/registration.hpp"
 #include "core/odometry/relocalization.hpp"
+#include "core/odometry/ring_start.hpp"
 #include "core/odometry/scan_features.hpp"
 #include "core/odometry/scan_intervals.hpp"
 #include "core/odometry/se3.hpp"
@@ -41,7 +42,8 @@ struct Odometry::State {
         first_reach_m(odometry_config.first_reach_m),
         map(odometry_config.local_map),
         history(odometry_config.motion),
-        intervals(sensor_model.period_s) {}
+        intervals(sensor_model.period_s),
+        is_by_surfaces(is_registered_by_surfaces(sensor, config)) {}
 
   /// The range image of the scan for the history; nothing where none is kept.
   [[nodiscard]] std::optional<RangeImageView> view_of(const Scan& scan, const PointLabels& labels,
@@ -113,6 +115,8 @@ struct Odometry::State {
   }
   void extend_map(const ScanInParts& parts, const Step& step,
                   const Eigen::Isometry3d& T_map_middle);
+  /// Keeps a scan of a lidar of few rings, and goes on by surfaces once the first ones are known.
+  void go_on_by_surfaces(const ScanInParts& parts, const Step& step);
   /// The first scan by the motion to the second, where that one rolled.
   void straighten(const FeatureSets& features, std::int64_t time_ns, const SweepTimes& sweep,
                   OdometryResult& second);
@@ -140,6 +144,10 @@ struct Odometry::State {
   ScanIntervals intervals;
   RegisteredScan last;
   FitStatistics fits;
+  /// Whether scans are registered by surfaces, not by edges and planes of rings.
+  bool is_by_surfaces;
+  /// The scans that were not.
+  RingStart ring_start;
 };
 
 bool Odometry::State::has_velocity(std::int64_t stamp_ns) const {
@@ -206,7 +214,7 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
 
 void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& prediction) const {
   const auto find_features = [&] {
-    if (!is_registered_by_surfaces(sensor, config)) {
+    if (!is_by_surfaces) {
       parts.features = extract_features(parts.scan, config.features);
       return;
     }
@@ -326,6 +334,7 @@ void Odometry::State::begin_anew(const FeatureSets& features, OdometryResult& re
   if (!has_first_alone || !is_lost_again || !can_begin_map(features, config)) return;
   map.clear();
   history = RangeImageHistory(config.motion);
+  ring_start.clear();
   first_scan.reset();
   started = false;
   result = OdometryResult{.T_map_lidar = last.T_map_lidar};
@@ -338,6 +347,7 @@ void Odometry::State::forget_stretch() {
   last = std::move(trusted.last);
   intervals = trusted.intervals;
   history = RangeImageHistory(config.motion);
+  ring_start.clear();
   stretch.reset();
 }
 
@@ -358,6 +368,28 @@ void Odometry::State::extend_map(const ScanInParts& parts, const Step& step,
   const bool is_uncompensated = last.interval_s <= 0.0;
   if (step.result.health == OdometryHealth::initialised && features.rolling && is_uncompensated)
     first_scan = {std::move(features), parts.sweep, T_map_middle};
+}
+
+void Odometry::State::go_on_by_surfaces(const ScanInParts& parts, const Step& step) {
+  if (is_by_surfaces || config.paper_exact || has_prior_map || first_scan) return;
+  ScanInParts again{.scan = parts.scan,
+                    .sweep = parts.sweep,
+                    .labels = parts.labels,
+                    .features = extract_surfaces(parts.scan, config.features),
+                    .objects = parts.objects,
+                    .motion_classes = parts.motion_classes,
+                    .sparse_rings = has_sparse_rings(sensor)};
+  FeatureSets registered = registered_features(again, config);
+  FeatureSets latest = registered;
+  ring_start.add(std::move(registered), map_features(again, step.motion, config),
+                 step.T_map_lidar_middle);
+  if (stretch || !fits.are_known() || !ring_start.is_complete()) return;
+  auto by_surfaces = ring_start.by_surfaces(config);
+  map = std::move(by_surfaces.map);
+  fits = by_surfaces.fits;
+  last.features = std::move(latest);
+  ring_start.clear();
+  is_by_surfaces = true;
 }
 
 Odometry::Odometry(const OdometryConfig& config, const SensorModel& sensor)
@@ -413,6 +445,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   // Features F_e and F_p, without those on objects that may be moving.
   ScanInParts parts{.scan = scan, .sweep = sweep, .labels = labels};
   state.take_apart(parts, prediction);
+  parts.sparse_rings = state.is_by_surfaces && has_sparse_rings(state.sensor);
   parts.sweep_prior = state.sweep_prior(time_ns, sweep, expected_motion);
 
   // Pose against the local map, eq. (5)-(13), at the middle of the sweep.
@@ -439,6 +472,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
     state.fits.add(step.result);
     state.update_state(time_ns, std::move(parts.view), step.T_map_lidar_middle);
     state.last.features = std::move(features);
+    state.go_on_by_surfaces(parts, step);
   }
 
   // What users see is at the stamp: points and pose go there from the middle of the sweep.

@@ -50,6 +50,8 @@ void check(const LocalMapConfig& c, FaultList& faults) {
 void check(const RegistrationConfig& c, const LocalMapConfig& map, FaultList& faults) {
   faults.require(c.neighbours >= 5 && c.neighbours <= Neighbours::capacity,
                  "registration.neighbours", c.neighbours, "within 5..16");
+  faults.require(c.sparse_ring_neighbours >= 5 && c.sparse_ring_neighbours <= Neighbours::capacity,
+                 "registration.sparse_ring_neighbours", c.sparse_ring_neighbours, "within 5..16");
   faults.require(c.max_neighbour_distance_m > 0.0 && c.max_neighbour_distance_m <= map.voxel_size_m,
                  "registration.max_neighbour_distance_m", c.max_neighbour_distance_m,
                  "above 0 and at most local_map.voxel_size_m");
@@ -71,6 +73,10 @@ void check(const RegistrationConfig& c, const LocalMapConfig& map, FaultList& fa
                  "above 0");
   faults.require(c.min_correspondences >= 6, "registration.min_correspondences",
                  c.min_correspondences, "6 or more");
+  faults.require(c.min_plane_width >= 0.0 && c.min_plane_width < 1.0,
+                 "registration.min_plane_width", c.min_plane_width, "within 0..1");
+  faults.require(c.sparse_ring_plane_width >= 0.0 && c.sparse_ring_plane_width < 1.0,
+                 "registration.sparse_ring_plane_width", c.sparse_ring_plane_width, "within 0..1");
   faults.require(c.across_rings_weight >= 0.0 && c.across_rings_weight <= 1.0,
                  "registration.across_rings_weight", c.across_rings_weight, "within 0..1");
   faults.require(c.max_extrapolation >= 0.0 && c.max_extrapolation <= 100.0,

@@ -44,8 +44,7 @@ struct FeatureConfig {
   /// At most one plane point in a cube of this size is registered [m].
   double plane_spacing_m = 0.5;
   /// Lidars with at least this many rings are registered by all their points, thinned, as lidars
-  /// without rings are; others by their rings' edges and planes. On simulated streets that leaves a
-  /// third of the error for 64 rings, while the rings of 16 are too far apart for it.
+  /// without rings are, from their first scan on; others begin with their rings' edges and planes.
   int min_surface_rings = 40;
   /// At most one point of such a lidar in a cube of this size enters the local map, and is
   /// registered [m].
@@ -92,6 +91,14 @@ struct RegistrationConfig {
   /// lidar: any surface shows such lines, where the lidar happens to look. Not in the paper; 1
   /// switches it off.
   double across_rings_weight = 0.1;
+  /// Neighbours that are spread less than this across than along, 0..1, by their standard
+  /// deviations squared, do not say how their plane is turned.
+  double min_plane_width = 0.1;
+  /// The same, and the neighbours, of lidars whose rings are far apart (has_sparse_rings), where
+  /// they are registered by surfaces: the nearest five map points mostly lie on one ring, and a
+  /// plane that leans over takes the lidar along. Lines along their rings do not count at all.
+  int sparse_ring_neighbours = 16;
+  double sparse_ring_plane_width = 0.5;
   /// Of a lidar with rings: a plane tells little of a point that lies farther than this from the
   /// middle of its neighbours, along the plane, in standard deviations of theirs (a Mahalanobis
   /// distance): the few rings of the scans before, which err together, turn the plane about

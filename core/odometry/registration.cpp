@@ -37,9 +37,11 @@ struct Correspondence {
 
 enum class FeatureKind { edge, plane, surface };
 
-std::optional<FittedSurface> fit(FeatureKind kind, const Neighbours& neighbours) {
+std::optional<FittedSurface> fit(FeatureKind kind, const Neighbours& neighbours,
+                                 double min_plane_width) {
   if (kind == FeatureKind::edge) return fit_line(neighbours);
-  return kind == FeatureKind::plane ? fit_plane(neighbours) : fit_surface(neighbours);
+  return kind == FeatureKind::plane ? fit_plane(neighbours, min_plane_width)
+                                    : fit_surface(neighbours, min_plane_width);
 }
 
 /// Takes a feature to where the pose puts it. Returns whether its neighbours are to be looked up.
@@ -59,7 +61,7 @@ void look_up(const FeaturePoint& feature, FeatureKind kind, const FeatureMap& ma
   const Neighbours neighbours = map.nearest(found.searched_map, config.neighbours,
                                             static_cast<float>(config.max_neighbour_distance_m));
   found.in_known_space = neighbours.count > 0;
-  const auto surface = fit(kind, neighbours);
+  const auto surface = fit(kind, neighbours, config.min_plane_width);
   found.found = surface.has_value();
   if (!surface) return;
   found.surface =
@@ -395,6 +397,11 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
   if (!features.in_rings) {
     limits.across_rings_weight = 1.0;
     limits.max_extrapolation = 0.0;
+  }
+  if (features.sparse_rings) {
+    limits.neighbours = limits.sparse_ring_neighbours;
+    limits.min_plane_width = limits.sparse_ring_plane_width;
+    limits.across_rings_weight = 0.0;
   }
   OdometryResult result;
   result.T_map_lidar = T_map_lidar_predicted;

@@ -52,6 +52,8 @@ struct FeatureSets {
   SweepPrior sweep_prior;
   /// By a lidar that turns about its z axis and sees rings.
   bool in_rings = false;
+  /// They are so far apart that `RegistrationConfig::sparse_ring_neighbours` make a surface.
+  bool sparse_rings = false;
 };
 
 /// The local map's feature sets M_e and M_p, and points of any kind for the alignment of points.

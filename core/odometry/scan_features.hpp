@@ -34,6 +34,8 @@ struct ScanInParts {
   std::optional<RangeImageView> view{};
   std::vector<MotionClass> motion_classes{};
   SweepPrior sweep_prior{};
+  /// Registered by surfaces, though few points of a ring have neighbours on the next one.
+  bool sparse_rings = false;
   MovableUse movable = MovableUse::none;
 };
 

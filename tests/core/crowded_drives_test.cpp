@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -92,6 +93,30 @@ TEST(CrowdedDrives, FollowASparseLidarThroughDenseTraffic) {
   EXPECT_LE(lost, 3);
 }
 
+/// Without labels the edges and planes of 16 rings are those of vehicles: by these alone it went
+/// astray by metres.
+TEST(CrowdedDrives, FollowASparseLidarThroughDenseTrafficWithoutLabels) {
+  const SimulationConfig config = dense_traffic(330);
+  const Simulation simulation(config);
+  MapperConfig unlabelled;
+  unlabelled.sensor = config.sensor;
+  Mapper mapper(unlabelled, std::make_unique<NullSegmenter>());
+  Eigen::Isometry3d T_map_last = Eigen::Isometry3d::Identity();
+  constexpr int first = 60;
+  for (int k = first; k < config.scans; ++k) {
+    const auto mapped = mapper.process(simulation.scan(k).scan);
+    ASSERT_TRUE(mapped);
+    ASSERT_NE(mapped->odometry.health, OdometryHealth::lost) << "scan " << k;
+    const Eigen::Isometry3d T_map_lidar = mapped->odometry.T_map_lidar;
+    const Eigen::Isometry3d off =
+        true_motion(simulation, k).inverse() * (T_map_last.inverse() * T_map_lidar);
+    if (k > first) {
+      EXPECT_LT(off.translation().norm(), 0.25) << "scan " << k;
+    }
+    T_map_last = T_map_lidar;
+  }
+}
+
 /// Voxels of a map that are no ground, within 15 m of a place.
 std::size_t upright_voxels_near(const MapSnapshot& view, const Eigen::Vector3d& position_map) {
   std::size_t count = 0;
@@ -106,14 +131,18 @@ std::size_t upright_voxels_near(const MapSnapshot& view, const Eigen::Vector3d& 
   return count;
 }
 
-/// For 84 scans nothing confirms the place, then a hundred metres of motion that was seen do.
+/// For 200 scans nothing confirms the place, then a hundred metres of motion that was seen do.
 TEST(CrowdedDrives, MapWhatWasSeenWhileThePlaceWasInDoubt) {
-  const SimulationConfig config = dense_traffic(350);
+  SimulationConfig config = crowded_street();
+  config.seed = 502;
+  config.scans = 310;
+  config.rolling = true;
+  constexpr int before_doubt = 30;
   const Simulation simulation(config);
   Mapper mapper = mapper_with_labels(config.sensor);
   std::vector<Eigen::Vector3d> waiting_map;
   std::size_t entered = 0;
-  for (int k = before_dense_traffic; k < config.scans && entered < 20; ++k) {
+  for (int k = before_doubt; k < config.scans && entered < 20; ++k) {
     const auto mapped = mapper.process(simulation.scan(k).scan);
     ASSERT_TRUE(mapped);
     const OdometryResult& odometry = mapped->odometry;
@@ -127,8 +156,11 @@ TEST(CrowdedDrives, MapWhatWasSeenWhileThePlaceWasInDoubt) {
   ASSERT_GE(entered, 20U);
   ASSERT_GE(waiting_map.size(), entered);
   const auto view = mapper.map_snapshot();
-  for (const Eigen::Vector3d& position_map : waiting_map)
-    EXPECT_GT(upright_voxels_near(*view, position_map), 200U) << position_map.transpose();
+  // More scans wait than there is room for.
+  const auto mapped_places = std::ranges::count_if(waiting_map, [&](const auto& position_map) {
+    return upright_voxels_near(*view, position_map) > 200U;
+  });
+  EXPECT_GT(static_cast<double>(mapped_places), 0.85 * static_cast<double>(waiting_map.size()));
 }
 
 /// What the odometry errs by from the first of these scans to the last.

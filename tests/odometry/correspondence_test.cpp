@@ -193,6 +193,19 @@ TEST(Extrapolation, IsInStandardDeviationsOfThePlanesNeighboursAlongIt) {
   }
 }
 
+/// As on two rings of a lidar, one point of the other ring beside four of one.
+TEST(FitPlane, RejectsWhatIsNarrowerThanAsked) {
+  const std::vector<Eigen::Vector3d> points{
+      {0.0, 0.0, 0.0}, {0.3, 0.0, 0.0}, {0.6, 0.0, 0.0}, {0.9, 0.0, 0.0}, {0.45, 0.5, 0.0}};
+  // Variances of 0.09 and 0.04 m^2.
+  EXPECT_TRUE(fit_plane(neighbours_at(points), 0.4));
+  EXPECT_FALSE(fit_plane(neighbours_at(points), 0.5));
+  const auto surface = fit_surface(neighbours_at(points), 0.4);
+  ASSERT_TRUE(surface);
+  EXPECT_EQ(surface->normal_count, 1U);
+  EXPECT_FALSE(fit_surface(neighbours_at(points), 0.5)) << "and no line either";
+}
+
 TEST(FitPlane, RejectsWhatIsNoPlane) {
   std::mt19937 random(6);
   const PlaneCase truth = random_plane(random);

@@ -180,6 +180,17 @@ TEST(ExtractFeatures, ShortRingHasNone) {
   EXPECT_THAT(features.planes, IsEmpty());
 }
 
+TEST(HasSparseRings, TellsLidarsByTheAngleBetweenTheirRings) {
+  EXPECT_TRUE(has_sparse_rings(vlp_16()));
+  EXPECT_FALSE(has_sparse_rings(hdl_32e()));
+  EXPECT_FALSE(has_sparse_rings(hdl_64e()));
+  SensorModel half = hdl_64e();
+  half.rings = 16;
+  EXPECT_TRUE(has_sparse_rings(half));
+  half.pattern = ScanPattern::irregular;
+  EXPECT_FALSE(has_sparse_rings(half)) << "it has none";
+}
+
 TEST(RingCurvature, IsTheSquaredSumOfTenDifferences) {
   const Scan scan = ring_scan(-5.0 * degree, 5.0 * degree, [](double azimuth) {
     return 5.0 / (std::cos(azimuth) - std::abs(std::sin(azimuth)));
