@@ -28,12 +28,12 @@ struct FittedSurface {
 
 /// Plane through neighbours by PCA, eq. (11). Nothing unless they are flat, and spread in two
 /// directions: across by a share of `min_width` of that along, as variances.
-[[nodiscard]] std::optional<FittedSurface> fit_plane(const Neighbours& neighbours,
-                                                     double min_width = 0.1);
+[[nodiscard]] std::optional<FittedSurface> fit_plane(
+    const Neighbours& neighbours, double min_width = RegistrationConfig{}.min_plane_width);
 
 /// The plane where there is one, else the line.
-[[nodiscard]] std::optional<FittedSurface> fit_surface(const Neighbours& neighbours,
-                                                       double min_plane_width = 0.1);
+[[nodiscard]] std::optional<FittedSurface> fit_surface(
+    const Neighbours& neighbours, double min_plane_width = RegistrationConfig{}.min_plane_width);
 
 /// A line as a lidar sees it that turns about its z axis, from a point of its scan. One that runs
 /// along the lidar's rings may be no edge: any wall shows such lines, which rise or fall as the

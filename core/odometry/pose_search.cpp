@@ -172,6 +172,16 @@ class BestStart {
   double score_ = 0.0;
 };
 
+/// Whether a scan that starts there needs no other start: it fits, or registration in two stages
+/// comes to the same pose. The paper has one start.
+bool is_settled_from(const Eigen::Isometry3d& T_map_lidar, const FeatureSets& features,
+                     const LocalMap& map, const OdometryConfig& config, BestStart& best) {
+  const OdometryResult direct = register_features(features, map, T_map_lidar, config);
+  if (best.take(direct) || config.paper_exact) return true;
+  const OdometryResult wide = register_in_two_stages(features, map, T_map_lidar, config);
+  return best.take(wide) || agree(direct, wide);
+}
+
 /// At most so many of the points, spread evenly.
 std::vector<FeaturePoint> every_nth(const std::vector<FeaturePoint>& points,
                                     std::size_t max_count) {
@@ -432,11 +442,8 @@ OdometryResult search_near_prediction(const FeatureSets& features, const LocalMa
                                       const PosePrediction& prediction, const FitStatistics& fits,
                                       const OdometryConfig& config) {
   constexpr bool is_first_motion = false;
-  const Eigen::Isometry3d& T_map_lidar = prediction.T_map_lidar;
-  BestStart best(T_map_lidar, is_first_motion, features, map, fits, config);
-  if (best.take(register_features(features, map, T_map_lidar, config)) || config.paper_exact)
-    return best.result();
-  best.take(register_in_two_stages(features, map, T_map_lidar, config));
+  BestStart best(prediction.T_map_lidar, is_first_motion, features, map, fits, config);
+  static_cast<void>(is_settled_from(prediction.T_map_lidar, features, map, config, best));
   return best.result();
 }
 
@@ -446,11 +453,7 @@ OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,
   const bool is_first_motion = last.interval_s <= 0.0;
   BestStart best(prediction.T_map_lidar, is_first_motion, features, map, fits, config);
   if (prediction.is_known) {
-    const OdometryResult direct = register_features(features, map, prediction.T_map_lidar, config);
-    if (best.take(direct) || config.paper_exact) return best.result();
-    const OdometryResult wide =
-        register_in_two_stages(features, map, prediction.T_map_lidar, config);
-    if (best.take(wide) || agree(direct, wide)) return best.result();
+    if (is_settled_from(prediction.T_map_lidar, features, map, config, best)) return best.result();
     // The motion of the last scan whatever the stamps say, and none.
     for (const Eigen::Isometry3d& T :
          {Eigen::Isometry3d(last.T_map_lidar * last.motion), last.T_map_lidar}) {

@@ -1,0 +1,276 @@
+#include "core/odometry/odometry_steps.hpp"
+
+#include <tbb/parallel_invoke.h>
+
+#include <cmath>
+#include <utility>
+
+#include "core/odometry/object_clusters.hpp"
+#include "core/odometry/relocalization.hpp"
+#include "core/odometry/se3.hpp"
+
+namespace stillmap {
+namespace {
+
+/// A lost scan is looked for up to so far away, and farther by what was driven since [m].
+constexpr double relocalization_reach_m = 24.0;
+constexpr double max_relocalization_reach_m = 60.0;
+/// Motion is classified again where the pose is farther than this from the predicted one [m, rad].
+constexpr double reclassify_distance_m = 0.2;
+constexpr double reclassify_angle_rad = 0.01;
+
+}  // namespace
+
+bool Odometry::State::has_velocity(std::int64_t stamp_ns) const {
+  return last.interval_s > 0.0 && lost_scans == 0 &&
+         intervals.since_last_s(stamp_ns) <= max_prediction_s;
+}
+
+Eigen::Isometry3d Odometry::State::motion_to_middle(
+    double interval_s, const std::optional<InertialMotion>& inertial) const {
+  const Eigen::Isometry3d T_last_middle = last.motion_during(interval_s);
+  if (!follows(inertial)) return T_last_middle;
+  PoseTangent twist = twist_of(T_last_middle);
+  twist.tail<3>() = so3_log(inertial->R_last_middle);
+  return motion_of(twist);
+}
+
+PosePrediction Odometry::State::predict(std::int64_t time_ns,
+                                        const std::optional<Eigen::Isometry3d>& T_map_lidar_known,
+                                        bool is_prior,
+                                        const std::optional<InertialMotion>& inertial) const {
+  const double interval_s = intervals.since_last_s(time_ns);
+  return {.T_map_lidar = T_map_lidar_known
+                             ? *T_map_lidar_known
+                             : last.T_map_lidar * motion_to_middle(interval_s, inertial),
+          .interval_s = interval_s,
+          .is_known = is_prior || has_velocity(time_ns),
+          .is_prior = is_prior,
+          .lost_scans = lost_scans,
+          .is_searched_widely = is_searched_widely()};
+}
+
+OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
+                                              const PosePrediction& prediction) const {
+  if (!started) {
+    if (prior_map.empty()) {
+      return can_begin_map(features, config) ? OdometryResult{.T_map_lidar = prediction.T_map_lidar}
+                                             : lost_at(prediction.T_map_lidar);
+    }
+    return relocalize(features, prior_map, map, prediction.T_map_lidar, method(),
+                      is_searched_widely() ? first_reach_m : 0.0);
+  }
+  // Until the place is known, few features tell it sooner.
+  OdometryResult found = search_pose(lost_scans > 0 ? downsampled(features) : features, map, last,
+                                     prediction, fits, method());
+  if (lost_scans > 0 && found.health != OdometryHealth::lost)
+    found = register_features(features, map, found.T_map_lidar, method(), found.sweep_correction);
+  const bool is_believed = prediction.is_known || !fits.are_known()
+                               ? fits.believes(found)
+                               : fits.believes_relocalized(found);
+  if (found.health != OdometryHealth::lost && is_believed) return found;
+  if (is_foretold(found, features, map, prediction, fits, config)) {
+    found.health = OdometryHealth::degenerate;
+    return found;
+  }
+  if (lost_scans > 0 && is_searched_widely()) {
+    const double driven_m = last.speed_m_s() * prediction.interval_s;
+    const OdometryResult again =
+        relocalize(features, points_of(map), map, prediction.T_map_lidar, method(),
+                   std::min(relocalization_reach_m + driven_m, max_relocalization_reach_m));
+    if (fits.believes_relocalized(again)) return again;
+  }
+  return lost_at(prediction.T_map_lidar);
+}
+
+void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& prediction) const {
+  parts.sparse_rings = is_by_surfaces && has_sparse_rings(sensor);
+  const auto find_features = [&] {
+    if (!is_by_surfaces) {
+      parts.features = extract_features(parts.scan, config.features);
+      return;
+    }
+    parts.features = extract_surfaces(parts.scan, config.features);
+    if (prediction.is_known && fits.are_known())
+      parts.few_surfaces = few_surfaces(parts.scan, config.features, parts.features);
+  };
+  tbb::parallel_invoke(
+      find_features,
+      [&] {
+        parts.objects = cluster_objects(parts.scan.points_lidar, parts.labels.classes,
+                                        config.motion.object_gap_m);
+      },
+      [&] { parts.view = view_of(parts.scan, parts.labels, prediction.T_map_lidar); });
+  parts.motion_classes = classify(parts, prediction.T_map_lidar);
+}
+
+OdometryResult Odometry::State::find_pose(ScanInParts& parts, const PosePrediction& prediction,
+                                          FeatureSets& features) const {
+  if (!parts.few_surfaces.empty()) {
+    std::swap(parts.features.surfaces, parts.few_surfaces);
+    features = registered_features(parts, config);
+    const OdometryResult found = search_near_prediction(features, map, prediction, fits, method());
+    if (fits.fits(found) && fits.believes(found)) return found;
+    std::swap(parts.features.surfaces, parts.few_surfaces);
+  }
+  features = registered_features(parts, config);
+  return estimate_pose(features, prediction);
+}
+
+void Odometry::State::reclassify_motion(ScanInParts& parts,
+                                        const Eigen::Isometry3d& T_map_lidar_predicted,
+                                        FeatureSets& features, OdometryResult& result) const {
+  if (!parts.view || !started || result.health == OdometryHealth::lost) return;
+  const PoseTangent off = boxminus(result.T_map_lidar, T_map_lidar_predicted);
+  if (off.head<3>().norm() < reclassify_distance_m && off.tail<3>().norm() < reclassify_angle_rad)
+    return;
+  parts.view->move_to(result.T_map_lidar);
+  parts.motion_classes = classify(parts, result.T_map_lidar);
+  if (parts.movable == MovableUse::none) return;
+  features = registered_features(parts, config);
+  const OdometryResult again =
+      register_features(features, map, result.T_map_lidar, method(), result.sweep_correction);
+  if (again.health != OdometryHealth::lost) result = again;
+}
+
+void Odometry::State::update_state(std::int64_t stamp_ns, std::optional<RangeImageView> view,
+                                   const Eigen::Isometry3d& T_map_lidar_now) {
+  if (started) {
+    const double interval_s = intervals.since_last_s(stamp_ns);
+    has_jumped = !is_reachable(last, T_map_lidar_now, interval_s, last.interval_s > 0.0,
+                               sensor.motion_limits);
+    last.motion = last.T_map_lidar.inverse() * T_map_lidar_now;
+    last.interval_s = interval_s;
+    intervals.add(stamp_ns);
+  } else {
+    intervals.begin(stamp_ns);
+  }
+  started = true;
+  prior_map = {};
+  last.T_map_lidar = T_map_lidar_now;
+  if (!view) return;
+  view->move_to(T_map_lidar_now);
+  const auto is_gone = [&](const Eigen::Vector3f& p_map) {
+    return history.sees_through(*view, p_map);
+  };
+  map.edges.remove_movable_if(is_gone);
+  map.planes.remove_movable_if(is_gone);
+  history.add(*std::move(view));
+}
+
+void Odometry::State::straighten(const FeatureSets& features, std::int64_t time_ns,
+                                 const SweepTimes& sweep, OdometryResult& second) {
+  if (!first_scan) return;
+  const FirstScan first = *std::exchange(first_scan, std::nullopt);
+  const double interval_s = intervals.stamped_since_last_s(time_ns);
+  if (second.health == OdometryHealth::lost || interval_s > max_prediction_s || !features.rolling)
+    return;
+  straighten_first_scan(first, features, interval_s, sweep, method(), map, last, second);
+}
+
+void Odometry::State::confirm_place(const FeatureSets& features, const PosePrediction& prediction,
+                                    OdometryResult& result) {
+  if (config.paper_exact || !fits.are_known()) return;
+  if (result.health == OdometryHealth::lost) {
+    // What the stretch has brought did not help: it is looked for in what was known before.
+    if (stretch && lost_scans > 0) forget_stretch();
+    if (stretch && !stretch->has_jumped()) result.map_entry = MapEntry::stays_out;
+    return;
+  }
+  const bool is_jump = !prediction.is_known;
+  const bool is_doubtful =
+      is_jump || (result.health == OdometryHealth::degenerate && !prediction.is_prior);
+  if (!stretch && !is_doubtful) return;
+  if (!stretch) stretch.emplace(UnconfirmedStretch::Trusted{map, last, intervals, fits});
+  if (is_jump) {
+    const double distance_m = distance_from_expected(result.T_map_lidar, last, prediction);
+    if (!is_followed(distance_m, prediction)) stretch->jump(distance_m);
+  }
+  using enum UnconfirmedStretch::Decision;
+  const auto decision = stretch->evaluate(features, config, result);
+  if (decision == confirmed) {
+    UnconfirmedStretch::Trusted trusted = stretch->take_trusted();
+    map = std::move(trusted.map);
+    fits = trusted.fits;
+  }
+  if (decision == confirmed || decision == settled) return stretch.reset();
+  result.health = OdometryHealth::degenerate;
+  if (decision == open) return;
+  forget_stretch();
+  result = lost_at(last.T_map_lidar);
+}
+
+void Odometry::State::begin_anew(const FeatureSets& features, OdometryResult& result) {
+  const bool has_first_alone = started && last.interval_s <= 0.0 && !has_prior_map;
+  const bool is_lost_again = lost_scans > 0 && result.health == OdometryHealth::lost;
+  if (!has_first_alone || !is_lost_again || !can_begin_map(features, config)) return;
+  map.clear();
+  history = RangeImageHistory(config.motion);
+  ring_start.clear();
+  first_scan.reset();
+  started = false;
+  result = OdometryResult{.T_map_lidar = last.T_map_lidar};
+}
+
+void Odometry::State::forget_stretch() {
+  UnconfirmedStretch::Trusted trusted = stretch->take_trusted();
+  map = std::move(trusted.map);
+  fits = trusted.fits;
+  last = std::move(trusted.last);
+  intervals = trusted.intervals;
+  history = RangeImageHistory(config.motion);
+  ring_start.clear();
+  stretch.reset();
+}
+
+void Odometry::State::add_drift(std::int64_t time_ns, const PosePrediction& prediction,
+                                OdometryResult& result) {
+  if (!started) return;
+  const bool is_followed =
+      stretch && !stretch->has_jumped() && result.health != OdometryHealth::lost;
+  const double since_s = (stretch ? stretch->trusted().intervals : intervals).since_last_s(time_ns);
+  result.covariance += drift_covariance(stretch ? stretch->trusted().last : last, since_s,
+                                        is_followed || prediction.is_prior);
+}
+
+void Odometry::State::extend_map(const ScanInParts& parts, const Step& step,
+                                 const Eigen::Isometry3d& T_map_middle) {
+  FeatureSets features = map_features(parts, step.motion, config);
+  extend_local_map(map, features, T_map_middle);
+  const bool is_uncompensated = last.interval_s <= 0.0;
+  if (step.result.health == OdometryHealth::initialised && features.rolling && is_uncompensated)
+    first_scan = {std::move(features), parts.sweep, T_map_middle};
+}
+
+void Odometry::State::take(ScanInParts& parts, const Step& step, std::int64_t time_ns,
+                           FeatureSets features) {
+  extend_map(parts, step, step.T_map_lidar_middle);
+  fits.add(step.result);
+  update_state(time_ns, std::move(parts.view), step.T_map_lidar_middle);
+  last.features = std::move(features);
+  go_on_by_surfaces(parts, step);
+}
+
+void Odometry::State::go_on_by_surfaces(const ScanInParts& parts, const Step& step) {
+  if (is_by_surfaces || config.paper_exact || has_prior_map || first_scan) return;
+  ScanInParts again{.scan = parts.scan,
+                    .sweep = parts.sweep,
+                    .labels = parts.labels,
+                    .features = extract_surfaces(parts.scan, config.features),
+                    .objects = parts.objects,
+                    .motion_classes = parts.motion_classes,
+                    .sparse_rings = has_sparse_rings(sensor)};
+  FeatureSets registered = registered_features(again, config);
+  FeatureSets latest = registered;
+  ring_start.add(std::move(registered), map_features(again, step.motion, config),
+                 step.T_map_lidar_middle);
+  if (stretch || !fits.are_known() || !ring_start.is_complete()) return;
+  auto by_surfaces = ring_start.by_surfaces(config);
+  map = std::move(by_surfaces.map);
+  fits = by_surfaces.fits;
+  last.features = std::move(latest);
+  ring_start.clear();
+  is_by_surfaces = true;
+}
+
+}  // namespace stillmap
