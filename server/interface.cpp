@@ -1,5 +1,7 @@
 #include "server/interface.hpp"
 
+#include <algorithm>
+#include <cstdint>
 #include <memory>
 #include <set>
 #include <string>
@@ -15,6 +17,16 @@ ServerTraits traits(const ServerConfig& config, const InterfaceContext& context)
       .sensor = config.mapper.sensor.name,
       .points_topic = config.lidars.empty() ? config.topics.points : config.lidars.front().topic,
       .host_diagnostics = host_diagnostics(context.participant)};
+}
+
+/// As many as the network carries before an impatient client asks again: with the default timeout
+/// of 5 s that is after 2.5 s.
+std::uint32_t max_page_bytes(const dds::DdsOptions& options) {
+  constexpr std::uint32_t at_any_rate = 8'000'000;
+  constexpr double page_s = 1.5;
+  if (options.large_message_bytes_per_s == 0) return at_any_rate;
+  return static_cast<std::uint32_t>(
+      std::min<double>(at_any_rate, page_s * options.large_message_bytes_per_s));
 }
 
 }  // namespace
@@ -64,7 +76,8 @@ ServiceContext Interface::service_context(const ServerConfig& config,
       .traversability = context.traversability.views(),
       .grid_provider = context.traversability.grid(),
       .map_frame = config.frames.map,
-      .log = context.service_log};
+      .log = context.service_log,
+      .max_page_bytes = max_page_bytes(context.participant.options())};
   if (const OccupancyThread* occupancy = context.occupancy) {
     services.query_occupancy = [occupancy](const OccupancyQuery& query) {
       return occupancy->answer(query);

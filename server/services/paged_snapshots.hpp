@@ -19,7 +19,7 @@ class PagedSnapshots {
   using Clock = std::chrono::steady_clock;
   using Snapshot = std::shared_ptr<const MapSnapshot>;
 
-  /// Between two pages. A page of 8 MB takes `wifi` 11 s, and ten planners share its rate.
+  /// Between two pages. A page takes a slow network some 2 s, and ten planners share its rate.
   static constexpr std::chrono::seconds max_page_interval{150};
   /// After a last page: requests are repeated when their answers are lost, and others may be
   /// reading the same version.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <exception>
 #include <functional>
 #include <memory>
@@ -48,6 +49,8 @@ struct ServiceContext {
   const TraversabilityGridProvider& grid_provider;
   std::string map_frame;
   ServiceLog& log;
+  /// A client that wants more gets more pages of get_static_map.
+  std::uint32_t max_page_bytes = 8'000'000;
   /// Used by get_static_map alone, on one thread.
   std::shared_ptr<PagedSnapshots> paged_snapshots = std::make_shared<PagedSnapshots>();
 };

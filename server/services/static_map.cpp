@@ -16,9 +16,6 @@ using namespace stillmap_msgs::srv;
 
 namespace {
 
-// Larger pages take too long on a slow network; a client that wants more gets more pages.
-constexpr std::uint32_t max_page_bytes = 8'000'000;
-
 /// The map that a page shows: that of the answer's first page, else the newest. A page after the
 /// first needs no history.
 MapState state_for(const ServiceContext& context, const MapQuery& query) {
@@ -79,7 +76,7 @@ GetStaticMap_Response get_static_map(const ServiceContext& context,
   return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
     auto [query, fault] = wire::from_request(request);
     if (!query) throw std::invalid_argument(fault);
-    query->max_bytes = std::min(query->max_bytes, max_page_bytes);
+    query->max_bytes = std::min(query->max_bytes, context.max_page_bytes);
     const MapState state = state_for(context, *query);
     const MapQueryResult result =
         query_map(*state.view, *query, state.history.get(), context.tiles);
