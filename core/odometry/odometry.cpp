@@ -103,6 +103,7 @@ void Odometry::add_prior_map(std::span<const LabelledPoint> points_map) {
   insert_prior_map(points_map, state.map);
   state.has_prior_map |= !points_map.empty();
   if (state.stretch) state.stretch->add_prior_map(points_map);
+  if (!state.is_by_surfaces) state.ring_start.set_prior_map(points_map);
   if (!state.started) state.prior_map.assign(points_map.begin(), points_map.end());
 }
 
@@ -111,6 +112,7 @@ void Odometry::begin_in(PriorMap prior) {
   assert(!state.started && state.map.points.size() == 0);
   state.has_prior_map = !prior.points_map.empty();
   state.map = std::move(prior.local_map);
+  if (!state.is_by_surfaces) state.ring_start.set_prior_map(prior.points_map);
   state.prior_map = std::move(prior.points_map);
 }
 

@@ -60,11 +60,11 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
     return relocalize(features, prior_map, map, prediction.T_map_lidar, method(),
                       is_searched_widely() ? first_reach_m : 0.0);
   }
-  // Until the place is known, few features tell it sooner.
-  OdometryResult found = search_pose(lost_scans > 0 ? downsampled(features) : features, map, last,
+  // Few features tell the place sooner. Of the first scans all are needed.
+  const bool is_rough = lost_scans > 0 || (fits.are_known() && !config.paper_exact);
+  OdometryResult found = search_pose(is_rough ? downsampled(features) : features, map, last,
                                      prediction, fits, method());
-  if (lost_scans > 0 && found.health != OdometryHealth::lost)
-    found = register_features(features, map, found.T_map_lidar, method(), found.sweep_correction);
+  if (is_rough) found = refined(found, features, map, method());
   const bool is_believed = prediction.is_known || !fits.are_known()
                                ? fits.believes(found)
                                : fits.believes_relocalized(found);
@@ -252,7 +252,7 @@ void Odometry::State::take(ScanInParts& parts, const Step& step, std::int64_t ti
 }
 
 void Odometry::State::go_on_by_surfaces(const ScanInParts& parts, const Step& step) {
-  if (is_by_surfaces || config.paper_exact || has_prior_map || first_scan) return;
+  if (is_by_surfaces || config.paper_exact || first_scan) return;
   ScanInParts again{.scan = parts.scan,
                     .sweep = parts.sweep,
                     .labels = parts.labels,
@@ -269,7 +269,7 @@ void Odometry::State::go_on_by_surfaces(const ScanInParts& parts, const Step& st
   map = std::move(by_surfaces.map);
   fits = by_surfaces.fits;
   last.features = std::move(latest);
-  ring_start.clear();
+  ring_start = {};
   is_by_surfaces = true;
 }
 

@@ -442,9 +442,19 @@ OdometryResult search_near_prediction(const FeatureSets& features, const LocalMa
                                       const PosePrediction& prediction, const FitStatistics& fits,
                                       const OdometryConfig& config) {
   constexpr bool is_first_motion = false;
-  BestStart best(prediction.T_map_lidar, is_first_motion, features, map, fits, config);
-  static_cast<void>(is_settled_from(prediction.T_map_lidar, features, map, config, best));
-  return best.result();
+  const FeatureSets some = downsampled(features);
+  BestStart best(prediction.T_map_lidar, is_first_motion, some, map, fits, config);
+  static_cast<void>(is_settled_from(prediction.T_map_lidar, some, map, config, best));
+  return refined(best.result(), features, map, config);
+}
+
+OdometryResult refined(const OdometryResult& found, const FeatureSets& features,
+                       const LocalMap& map, const OdometryConfig& config) {
+  if (found.health == OdometryHealth::lost) return found;
+  OdometryResult result =
+      register_features(features, map, found.T_map_lidar, config, found.sweep_correction);
+  result.iterations += found.iterations;
+  return result;
 }
 
 OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,

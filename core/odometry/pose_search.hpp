@@ -111,13 +111,18 @@ struct PosePrediction {
                                const LocalMap& map, const PosePrediction& prediction,
                                const FitStatistics& fits, const OdometryConfig& config);
 
-/// From the prediction alone, in two stages where that does not fit: for few features, before all
-/// are looked at. The better of both.
+/// From the prediction alone, in two stages where that does not fit: before other starts are tried.
+/// The better of both, found by few features and refined by all. A robust kernel
+/// takes many small steps to a pose that the prediction misses.
 [[nodiscard]] OdometryResult search_near_prediction(const FeatureSets& features,
                                                     const LocalMap& map,
                                                     const PosePrediction& prediction,
                                                     const FitStatistics& fits,
                                                     const OdometryConfig& config);
+
+/// A pose that few features found, by all of them.
+[[nodiscard]] OdometryResult refined(const OdometryResult& found, const FeatureSets& features,
+                                     const LocalMap& map, const OdometryConfig& config);
 
 /// All starts that may lead to the pose, the cheapest first, until one fits.
 [[nodiscard]] OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,

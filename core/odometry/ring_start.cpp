@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "core/odometry/prior_map.hpp"
 #include "core/odometry/scan_features.hpp"
 
 namespace stillmap {
@@ -25,14 +26,19 @@ void RingStart::add(FeatureSets registered, FeatureSets mapped,
   if (scans_.size() > max_scans) scans_.pop_front();
 }
 
+void RingStart::set_prior_map(std::span<const LabelledPoint> points_map) {
+  prior_points_map_.assign(points_map.begin(), points_map.end());
+}
+
 bool RingStart::is_complete() const { return scans_.size() >= enough_scans; }
 
 RingStart::BySurfaces RingStart::by_surfaces(const OdometryConfig& config) const {
   OdometryConfig in_place = config;
   in_place.registration.max_iterations = 1;
   BySurfaces result{LocalMap(config.local_map), FitStatistics()};
+  insert_prior_map(prior_points_map_, result.map);
   for (const RingScan& scan : scans_) {
-    if (&scan != &scans_.front())
+    if (&scan != &scans_.front() || !prior_points_map_.empty())
       result.fits.add(register_features(scan.registered, result.map, scan.T_map_lidar, in_place));
     extend_local_map(result.map, scan.mapped, scan.T_map_lidar);
   }

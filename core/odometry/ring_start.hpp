@@ -1,6 +1,8 @@
 #pragma once
 
 #include <deque>
+#include <span>
+#include <vector>
 
 #include "core/odometry/pose_search.hpp"
 #include "core/odometry/registration.hpp"
@@ -17,6 +19,8 @@ class RingStart {
   /// what enters the map. Those from where the one before was tell nothing new.
   void add(FeatureSets registered, FeatureSets mapped, const Eigen::Isometry3d& T_map_lidar);
   void clear() { scans_.clear(); }
+  /// Points around the lidar of a map made earlier, which the map of surfaces has, too.
+  void set_prior_map(std::span<const LabelledPoint> points_map);
 
   /// Whether there are scans from enough positions.
   [[nodiscard]] bool is_complete() const;
@@ -36,6 +40,7 @@ class RingStart {
     Eigen::Isometry3d T_map_lidar;
   };
   std::deque<RingScan> scans_;
+  std::vector<LabelledPoint> prior_points_map_;
 };
 
 }  // namespace stillmap

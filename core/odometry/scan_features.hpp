@@ -47,7 +47,7 @@ struct ScanInParts {
 [[nodiscard]] FeatureSets map_features(const ScanInParts& parts, const std::vector<Motion>& motion,
                                        const OdometryConfig& config);
 
-/// Enough features to find a place by.
+/// Enough features to find a place by, and to tell which of several starts leads there.
 [[nodiscard]] FeatureSets downsampled(FeatureSets features);
 
 /// Adds edges and planes to the map, compensated for `sweep_twist` beyond what they were, and

@@ -41,6 +41,19 @@ TEST(RingStart, MapsWhatWasSeenFromAllPlacesAndKnowsHowItFits) {
   EXPECT_TRUE(by_surfaces.fits.are_known());
 }
 
+TEST(RingStart, GoesOnInAMapMadeEarlier) {
+  RingStart start;
+  const LabelledPoint far_wall{{-20.0F, 0.0F, 1.0F}, SemanticClass::unlabeled};
+  start.set_prior_map({&far_wall, 1});
+  start.add(square(), square(), at_x(0.0));
+  start.clear();
+  EXPECT_FALSE(start.is_complete());
+  for (int k = 0; k < 10; ++k) start.add(square(), square(), at_x(0.5 * k));
+  const LocalMap map = start.by_surfaces(OdometryConfig{}).map;
+  EXPECT_EQ(map.planes.size(), 1U + 19U * (19U + 9U));
+  EXPECT_EQ(map.points.nearest(far_wall.position_map, 1, 0.1F).count, 1);
+}
+
 TEST(RingStart, KeepsTheLastOnesOfALongStart) {
   RingStart start;
   for (int k = 0; k < 300; ++k) start.add(square(), square(), at_x(1.0 * k));
