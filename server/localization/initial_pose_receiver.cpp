@@ -20,7 +20,7 @@ InitialPoseReceiver::InitialPoseReceiver(dds::Participant& participant,
       statistics_(statistics),
       reader_(participant, dds::initial_pose_topic(ros_topic).dds_name,
               dds::initial_pose_topic(ros_topic).reader),
-      worker_(std::chrono::seconds(0),
+      worker_("initial_pose", std::chrono::seconds(0),
               [this, message = PoseWithCovarianceStamped()](const std::stop_token& stop) mutable {
                 if (reader_.take(message, stop, std::chrono::seconds(1))) take(message);
               }) {}

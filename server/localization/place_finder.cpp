@@ -86,7 +86,7 @@ PlaceFinder::PlaceFinder(const ServerConfig& config, const LatestMap& latest_map
       map_(latest_map, tiles),
       scans_(max_waiting_scans) {
   worker_.emplace(
-      scans_, [this](const LostScan& lost) { handle(lost); },
+      "place_finder", scans_, [this](const LostScan& lost) { handle(lost); },
       WorkerOptions{
           .on_start = [] { static_cast<void>(use_scheduling(BackgroundScheduling::low)); },
           .on_idle =

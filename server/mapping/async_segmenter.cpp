@@ -41,7 +41,7 @@ AsyncSegmenter::AsyncSegmenter(std::unique_ptr<Segmenter> source, std::chrono::m
   if (!may_skip_scans()) return;
   for (std::size_t i = 0; i < source_->concurrent_scans(); ++i) {
     workers_.emplace_back(
-        submitted_,
+        "segmenter", submitted_,
         [this](const Submitted& submitted) {
           ScanLabels labels = segment(submitted.scan);
           const std::scoped_lock lock(mutex_);

@@ -11,7 +11,7 @@ GnssReceiver::GnssReceiver(dds::Participant& participant, const std::string& ros
       statistics_(statistics),
       reader_(participant, dds::gnss_topic(ros_topic, delivery).dds_name,
               dds::gnss_topic(ros_topic, delivery).reader),
-      worker_(std::chrono::seconds(0),
+      worker_("gnss", std::chrono::seconds(0),
               [this, message = sensor_msgs::msg::NavSatFix()](const std::stop_token& stop) mutable {
                 if (reader_.take(message, stop, std::chrono::seconds(1))) take(message);
               }) {}

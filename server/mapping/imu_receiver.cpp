@@ -47,7 +47,7 @@ ImuReceiver::ImuReceiver(dds::Participant& participant, const std::string& ros_t
     : patience_(patience_of(delivery)),
       reader_(participant, dds::imu_topic(ros_topic, delivery).dds_name,
               dds::imu_topic(ros_topic, delivery).reader),
-      worker_(std::chrono::seconds(0),
+      worker_("imu", std::chrono::seconds(0),
               [this, message = sensor_msgs::msg::Imu()](const std::stop_token& stop) mutable {
                 if (!reader_.take(message, stop, std::chrono::seconds(1))) return;
                 if (const auto sample = wire::from_imu(message)) queue_.push(*sample);

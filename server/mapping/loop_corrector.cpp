@@ -46,7 +46,7 @@ LoopCorrector::LoopCorrector(const LiveLoopConfig& config, bool is_lossless, Sta
       antenna_base_(antenna_base),
       scans_(max_waiting_scans) {
   worker_.emplace(
-      scans_, [this](const ScanOfMap& scan) { look_at(scan); },
+      "loops", scans_, [this](const ScanOfMap& scan) { look_at(scan); },
       WorkerOptions{
           .on_start = [] { static_cast<void>(use_scheduling(BackgroundScheduling::low)); },
           .on_failure = [this] { failed_.request_stop(); }});

@@ -428,7 +428,8 @@ CheckpointWorker::CheckpointWorker(std::chrono::duration<double> period, std::fu
     : period_(period),
       save_(std::move(save)),
       clock_(clock),
-      worker_([this](const std::stop_token&) { return save_and_schedule(); }, clock) {}
+      worker_(
+          "saver", [this](const std::stop_token&) { return save_and_schedule(); }, clock) {}
 
 MonotonicClock::TimePoint CheckpointWorker::save_and_schedule() {
   const auto began = clock_.now();

@@ -88,7 +88,7 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
     begin_map({}, std::nullopt);
   }
   worker_.emplace(
-      queue_,
+      "mapping", queue_,
       [this](QueuedScan queued) {
         // Before the requests: its pose is urgent.
         map(std::move(queued));

@@ -70,7 +70,7 @@ OdometryPrior::OdometryPrior(dds::Participant& participant, const std::string& r
     : statistics_(statistics),
       reader_(participant, dds::odometry_prior_topic(ros_topic).dds_name,
               dds::odometry_prior_topic(ros_topic).reader),
-      worker_(std::chrono::seconds(0),
+      worker_("odom_prior", std::chrono::seconds(0),
               [this, message = nav_msgs::msg::Odometry()](const std::stop_token& stop) mutable {
                 if (reader_.take(message, stop, std::chrono::seconds(1))) add(message);
               }) {}

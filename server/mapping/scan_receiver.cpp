@@ -173,7 +173,7 @@ ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& co
       queue_(queue),
       statistics_(statistics),
       reader_(participant, topic_, points_of(config, ros_topic).reader),
-      worker_(std::chrono::seconds(0),
+      worker_("scans", std::chrono::seconds(0),
               [this, cloud = sensor_msgs::msg::PointCloud2()](const std::stop_token& stop) mutable {
                 eprosima::fastdds::dds::SampleInfo info;
                 if (reader_.take(cloud, info, stop, std::chrono::seconds(1))) {

@@ -14,7 +14,7 @@ StaticTransforms::StaticTransforms(dds::Participant& participant, const dds::Top
                                    Statistics& statistics)
     : statistics_(statistics),
       reader_(participant, topics.tf_static.dds_name, topics.tf_static.reader),
-      worker_(std::chrono::seconds(0),
+      worker_("tf_static", std::chrono::seconds(0),
               [this, message = tf2_msgs::msg::TFMessage()](const std::stop_token& stop) mutable {
                 eprosima::fastdds::dds::SampleInfo info;
                 // Our own are of the map, and tell nothing of the robot.

@@ -18,6 +18,7 @@
 
 #include "server/monitoring/metrics.hpp"
 #include "server/threads/thread_failure.hpp"
+#include "server/threads/thread_name.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -105,7 +106,10 @@ class MetricsListener {
   MetricsListener(const std::string& address, Connection::Respond respond)
       : respond_(std::move(respond)), acceptor_(io_, endpoint_of(io_, address)), retry_(io_) {
     accept();
-    thread_ = std::jthread([this] { run_or_report([this] { io_.run(); }); });
+    thread_ = std::jthread([this] {
+      name_this_thread("metrics");
+      run_or_report([this] { io_.run(); });
+    });
   }
   ~MetricsListener() {
     io_.stop();

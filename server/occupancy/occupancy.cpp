@@ -22,7 +22,7 @@ OctomapPublisher::OctomapPublisher(dds::Participant& participant, const dds::Top
       map_frame_(config.frames.map),
       period_(config.occupancy.publish_period_s),
       writer_(participant, topics.octomap.dds_name, topics.octomap.writer),
-      worker_(std::min(poll_period, period_),
+      worker_("octomap", std::min(poll_period, period_),
               [this](const std::stop_token&) { publish_when_due(); }) {}
 
 void OctomapPublisher::publish_when_due() {

@@ -22,7 +22,7 @@ OccupancyThread::OccupancyThread(const OccupancyServiceConfig& config, Statistic
       throttle_(std::move(throttle)),
       jobs_(config.queue_length + urgent_kinds),
       map_(config.map),
-      worker_(jobs_,
+      worker_("octree", jobs_,
               [this](Job job) { std::visit([this](auto& kind) { run(std::move(kind)); }, job); },
               {.on_start = [scheduling] { static_cast<void>(use_scheduling(scheduling)); },
                .before_take = [this] { this->throttle(); }}) {}

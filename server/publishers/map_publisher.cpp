@@ -15,11 +15,11 @@ MapPublisher::MapPublisher(dds::Participant& participant, const dds::Topics& top
       tiles_(participant, topics, tiles, config.publish.tile_window_m),
       path_(participant, topics.path.dds_name, topics.path.writer),
       cloud_(participant, topics.static_cloud.dds_name, topics.static_cloud.writer),
-      tile_worker_(std::chrono::duration<double>(config.publish.tiles_period_s),
+      tile_worker_("tiles", std::chrono::duration<double>(config.publish.tiles_period_s),
                    [this](const std::stop_token&) { publish_tiles(); }),
-      path_worker_(std::chrono::duration<double>(config.publish.path_period_s),
+      path_worker_("path", std::chrono::duration<double>(config.publish.path_period_s),
                    [this](const std::stop_token&) { publish_path(); }),
-      cloud_worker_(std::chrono::duration<double>(config.publish.cloud_period_s),
+      cloud_worker_("map_cloud", std::chrono::duration<double>(config.publish.cloud_period_s),
                     [this](const std::stop_token&) { publish_cloud(); }) {}
 
 bool MapPublisher::has_changed(PathState& published, bool with_view) const {

@@ -15,7 +15,7 @@ PosePublisher::PosePublisher(dds::Participant& participant, const dds::Topics& t
       odometry_(participant, topics.odometry.dds_name, topics.odometry.writer),
       tf_(participant, topics.tf.dds_name, topics.tf.writer),
       queue_(static_cast<std::size_t>(topics.odometry.writer.depth)),
-      worker_(queue_, [this](const Message& message) { write(message); },
+      worker_("poses", queue_, [this](const Message& message) { write(message); },
               {.finishes_queue = true}) {
   if (!frames.odom.empty() && frames.odom_source == FramesConfig::OdomSource::own) {
     local_odometry_.emplace(participant, topics.local_odometry.dds_name,
@@ -64,7 +64,7 @@ void PosePublisher::write(const Message& message) {
 LabelledScanPublisher::LabelledScanPublisher(dds::Participant& participant,
                                              const dds::Topics& topics)
     : writer_(participant, topics.scan.dds_name, topics.scan.writer),
-      worker_(newest_, [this](const Message& message) { write(message); },
+      worker_("labelled_scans", newest_, [this](const Message& message) { write(message); },
               {.finishes_queue = true}) {}
 
 void LabelledScanPublisher::publish(std::shared_ptr<const LabelledScan> labelled,

@@ -167,7 +167,7 @@ StatusPublisher::StatusPublisher(dds::Participant& participant, const dds::Topic
     : period_(period_s),
       status_(std::move(status)),
       writer_(participant, topics.status.dds_name, topics.status.writer),
-      worker_(std::min(poll_period, period_),
+      worker_("status", std::min(poll_period, period_),
               [this](const std::stop_token&) { publish_when_due(); }) {}
 
 void StatusPublisher::publish_when_due() {

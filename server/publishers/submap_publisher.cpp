@@ -4,7 +4,7 @@ namespace stillmap::server {
 
 SubmapPublisher::SubmapPublisher(dds::Participant& participant, const dds::Topics& topics)
     : writer_(participant, topics.submaps.dds_name, topics.submaps.writer),
-      worker_(newest_,
+      worker_("submaps", newest_,
               [this](const SubmapsOfMap& submaps) {
                 // A keep-last writer always has room.
                 static_cast<void>(writer_.write(wire::to_wire(submaps)));

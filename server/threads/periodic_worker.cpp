@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/threads/thread_failure.hpp"
+#include "server/threads/thread_name.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -36,15 +37,17 @@ MonotonicClock& MonotonicClock::steady() {
   return clock;
 }
 
-PeriodicWorker::PeriodicWorker(std::chrono::duration<double> period, Work work,
+PeriodicWorker::PeriodicWorker(std::string name, std::chrono::duration<double> period, Work work,
                                MonotonicClock& clock)
-    : PeriodicWorker(with_pauses(period, std::move(work), clock), clock) {}
+    : PeriodicWorker(std::move(name), with_pauses(period, std::move(work), clock), clock) {}
 
-PeriodicWorker::PeriodicWorker(Round round, MonotonicClock& clock)
-    : thread_([round = std::move(round), &clock](const std::stop_token& stop) {
-        run_or_report([&] {
-          while (!stop.stop_requested()) clock.sleep_until(round(stop), stop);
-        });
-      }) {}
+PeriodicWorker::PeriodicWorker(std::string name, Round round, MonotonicClock& clock)
+    : thread_(
+          [name = std::move(name), round = std::move(round), &clock](const std::stop_token& stop) {
+            name_this_thread(name);
+            run_or_report([&] {
+              while (!stop.stop_requested()) clock.sleep_until(round(stop), stop);
+            });
+          }) {}
 
 }  // namespace stillmap::server

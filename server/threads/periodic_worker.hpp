@@ -3,6 +3,7 @@
 #include <chrono>
 #include <functional>
 #include <stop_token>
+#include <string>
 #include <thread>
 
 #include "server/threads/monotonic_clock.hpp"
@@ -17,12 +18,12 @@ class PeriodicWorker {
   using Round = std::function<MonotonicClock::TimePoint(const std::stop_token& stop)>;
 
   /// Pauses for `period` between the end of one call and the next; 0 for work that waits itself,
-  /// until something happens or a stop is requested. What it throws ends the worker and is reported
-  /// (run_or_report).
-  PeriodicWorker(std::chrono::duration<double> period, Work work,
+  /// until something happens or a stop is requested. The thread has the name (name_this_thread).
+  /// What it throws ends the worker and is reported (run_or_report).
+  PeriodicWorker(std::string name, std::chrono::duration<double> period, Work work,
                  MonotonicClock& clock = MonotonicClock::steady());
   /// For rounds that say themselves when the next one is due.
-  explicit PeriodicWorker(Round round, MonotonicClock& clock = MonotonicClock::steady());
+  PeriodicWorker(std::string name, Round round, MonotonicClock& clock = MonotonicClock::steady());
 
   /// Ends soon; the destructor waits for that.
   void request_stop() { thread_.request_stop(); }

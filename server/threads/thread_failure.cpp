@@ -7,13 +7,15 @@
 
 #include <exception>
 
+#include "server/threads/thread_name.hpp"
+
 namespace stillmap::server {
 namespace {
 
 void report(const char* what) noexcept {
   // Of the log itself, nothing else is left to tell.
   try {
-    spdlog::critical("a thread failed, the server ends: {}", what);
+    spdlog::critical("thread {} failed, the server ends: {}", name_of_this_thread(), what);
   } catch (...) {
   }
   ::kill(::getpid(), thread_failure_signal);

@@ -3,11 +3,13 @@
 #include <chrono>
 #include <functional>
 #include <stop_token>
+#include <string>
 #include <thread>
 #include <utility>
 
 #include "server/threads/bounded_queue.hpp"
 #include "server/threads/thread_failure.hpp"
+#include "server/threads/thread_name.hpp"
 
 namespace stillmap::server {
 
@@ -30,13 +32,15 @@ struct WorkerOptions {
 template <typename T>
 class Worker {
  public:
-  /// The queue must outlive the worker. What `handle` and
-  /// the options throw ends the worker and is reported (run_or_report).
-  Worker(BoundedQueue<T>& queue, std::function<void(T)> handle, WorkerOptions options = {})
+  /// The queue must outlive the worker. The thread has the name (name_this_thread). What `handle`
+  /// and the options throw ends the worker and is reported (run_or_report).
+  Worker(std::string name, BoundedQueue<T>& queue, std::function<void(T)> handle,
+         WorkerOptions options = {})
       : queue_(queue),
         handle_(std::move(handle)),
         options_(std::move(options)),
-        thread_([this](const std::stop_token& stop) {
+        thread_([this, name = std::move(name)](const std::stop_token& stop) {
+          name_this_thread(name);
           run_or_report([&] { run(stop); }, options_.on_failure);
         }) {}
 

@@ -59,7 +59,7 @@ TraversabilityThread::TraversabilityThread(std::vector<RobotProfile> robots,
       traversability_(std::move(robots)),
       scheduling_(scheduling) {
   publish();
-  worker_.emplace(std::chrono::seconds(0), [this](const std::stop_token& stop) {
+  worker_.emplace("traversability", std::chrono::seconds(0), [this](const std::stop_token& stop) {
     if (!std::exchange(has_begun_, true) && !use_scheduling(scheduling_)) {
       spdlog::warn("traversability is computed at full priority");
     }

@@ -22,6 +22,8 @@ from loops import inverse, matrix, times, true_poses
 CASES = [
     ("yard 21, 16 rings", "--preset yard --sensor vlp_16 --seed 21", 600, 300, "", "--preset yard --sensor vlp_16 --seed 22"),
     ("the same, no labels", "--preset yard --sensor vlp_16 --seed 21", 600, 300, "--labels none", ""),
+    ("yard 21, 64 rings", "--preset yard --sensor hdl_64e --seed 21", 600, 300, "", ""),
+    ("the same 64 rings, no labels", "--preset yard --sensor hdl_64e --seed 21", 600, 300, "--labels none", ""),
     ("quiet 11, 16 rings", "--preset quiet --sensor vlp_16 --seed 11", 400, 400, "", "--preset quiet --sensor vlp_16 --seed 12"),
     ("crowd 6, 16 rings", "--preset crowd --sensor vlp_16 --seed 6", 400, 300, "", "--preset crowd --sensor vlp_16 --seed 7"),
     ("quiet 3, 64 rings, no labels", "--preset quiet --sensor hdl_64e --seed 3", 200, 150, "--labels none", ""),

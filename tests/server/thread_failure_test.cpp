@@ -36,7 +36,7 @@ class ThreadFailure : public testing::Test {
 TEST_F(ThreadFailure, OfAWorkerIsReportedAndEndsIt) {
   BoundedQueue<int> queue(3);
   std::promise<void> failed;
-  const Worker<int> worker(queue, [](int) { throw std::runtime_error("worn out"); },
+  const Worker<int> worker("worker", queue, [](int) { throw std::runtime_error("worn out"); },
                            {.on_failure = [&] { failed.set_value(); }});
   queue.push_dropping_oldest(1);
   EXPECT_TRUE(is_reported());
@@ -46,7 +46,7 @@ TEST_F(ThreadFailure, OfAWorkerIsReportedAndEndsIt) {
 }
 
 TEST_F(ThreadFailure, OfAPeriodicWorkerIsReportedWhateverItThrows) {
-  const PeriodicWorker worker(1ms, [](const std::stop_token&) { throw 42; });
+  const PeriodicWorker worker("periodic", 1ms, [](const std::stop_token&) { throw 42; });
   EXPECT_TRUE(is_reported());
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/threads/periodic_worker.hpp"
+#include "server/threads/thread_name.hpp"
 #include "tests/server/manual_clock.hpp"
 
 namespace stillmap::server {
@@ -63,7 +64,7 @@ TEST(BoundedQueue, StopsWaitingWhenAStopIsRequested) {
 TEST(Worker, TakesNothingMoreOnceItHasStopped) {
   BoundedQueue<int> queue(10);
   BoundedQueue<int> handled(10);
-  Worker<int> worker(queue, [&](int item) { handled.push_dropping_oldest(item); });
+  Worker<int> worker("worker", queue, [&](int item) { handled.push_dropping_oldest(item); });
   queue.push_dropping_oldest(1);
   ASSERT_TRUE(handled.wait_for_item({}, 60s));
   worker.stop();
@@ -77,7 +78,7 @@ TEST(Worker, FinishesItsQueueWhereThatIsAsked) {
   BoundedQueue<int> queue(10);
   for (int i = 1; i <= 3; ++i) queue.push_dropping_oldest(i);
   {
-    const Worker<int> worker(queue, [&](int item) { handled.push_back(item); },
+    const Worker<int> worker("worker", queue, [&](int item) { handled.push_back(item); },
                              {.finishes_queue = true});
   }
   EXPECT_THAT(handled, ElementsAre(1, 2, 3));
@@ -87,7 +88,7 @@ TEST(Worker, TakesWhatTheQueueHoldsAfterBeforeTake) {
   BoundedQueue<int> queue(1);
   std::promise<int> handled;
   queue.push_dropping_oldest(1);
-  const Worker<int> worker(queue, [&](int item) { handled.set_value(item); },
+  const Worker<int> worker("worker", queue, [&](int item) { handled.set_value(item); },
                            {.before_take = [&] { queue.push_dropping_oldest(2); }});
   auto item = handled.get_future();
   ASSERT_EQ(item.wait_for(60s), std::future_status::ready);
@@ -98,15 +99,31 @@ TEST(Worker, SaysWhenItIsIdle) {
   BoundedQueue<int> queue(1);
   BoundedQueue<bool> idle(1);
   const Worker<int> worker(
-      queue, [](int) {}, {.on_idle = [&] { idle.push_dropping_oldest(true); }, .idle_period = 1ms});
+      "worker", queue, [](int) {},
+      {.on_idle = [&] { idle.push_dropping_oldest(true); }, .idle_period = 1ms});
   EXPECT_TRUE(idle.wait_for_item({}, 60s));
+}
+
+TEST(Worker, NamesItsThread) {
+  BoundedQueue<int> queue(1);
+  BoundedQueue<std::string> names(2);
+  const Worker<int> worker("a name that is too long", queue,
+                           [&](int) { names.push_dropping_oldest(name_of_this_thread()); });
+  queue.push_dropping_oldest(1);
+  ASSERT_TRUE(names.wait_for_item({}, 60s));
+  EXPECT_EQ(names.try_pop(), "a name that is ");
+  const PeriodicWorker periodic("periodic", 3600s, [&](const std::stop_token&) {
+    names.push_dropping_oldest(name_of_this_thread());
+  });
+  ASSERT_TRUE(names.wait_for_item({}, 60s));
+  EXPECT_EQ(names.try_pop(), "periodic");
 }
 
 TEST(PeriodicWorker, PausesAfterEachCall) {
   test::ManualClock clock;
   int calls = 0;
   const PeriodicWorker worker(
-      10s,
+      "periodic", 10s,
       [&](const std::stop_token&) {
         clock.advance(3s);
         ++calls;
@@ -123,7 +140,8 @@ TEST(PeriodicWorker, PausesAfterEachCall) {
 
 TEST(PeriodicWorker, EndsWhileItPauses) {
   std::promise<void> called;
-  const PeriodicWorker worker(3600s, [&](const std::stop_token&) { called.set_value(); });
+  const PeriodicWorker worker("periodic", 3600s,
+                              [&](const std::stop_token&) { called.set_value(); });
   EXPECT_EQ(called.get_future().wait_for(60s), std::future_status::ready);
 }
 
