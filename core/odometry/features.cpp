@@ -219,20 +219,70 @@ std::vector<float> ring_curvature(const std::vector<Eigen::Vector3f>& ring) {
 
 namespace {
 
-std::vector<std::uint32_t> first_in_cubes(std::span<const Eigen::Vector3f> points,
-                                          std::span<const std::uint32_t> chosen,
-                                          float inverse_spacing) {
+/// Numbers 0 to n - 1, each once, in steps of the golden section.
+class ScatteredOrder {
+ public:
+  explicit ScatteredOrder(std::size_t n)
+      : size_(n), step_(static_cast<std::size_t>(0.618034 * static_cast<double>(n))), next_(n / 2) {
+    while (std::gcd(step_, size_) > 1) ++step_;
+  }
+  std::size_t next() {
+    const std::size_t here = next_;
+    next_ += step_;
+    if (next_ >= size_) next_ -= size_;
+    return here;
+  }
+
+ private:
+  std::size_t size_;
+  std::size_t step_;
+  std::size_t next_;
+};
+
+/// The same of many things, by windows of neighbours, which stay in the processor's cache.
+class ScatteredWindows {
+ public:
+  explicit ScatteredWindows(std::size_t n)
+      : size_(n), windows_((n + window_size - 1) / window_size), in_window_(0) {}
+  std::size_t next() {
+    if (left_ == 0) {
+      first_ = windows_.next() * window_size;
+      left_ = std::min(window_size, size_ - first_);
+      in_window_ = ScatteredOrder(left_);
+    }
+    --left_;
+    return first_ + in_window_.next();
+  }
+
+ private:
+  static constexpr std::size_t window_size = 128;
+  std::size_t size_;
+  std::size_t first_ = 0;
+  std::size_t left_ = 0;
+  ScatteredOrder windows_;
+  ScatteredOrder in_window_;
+};
+
+/// The one of each cube that is visited first. In the order of the scan that is the one on the side
+/// that the lidar looks at first: of such points every scan turned the lidar a little, always the
+/// way that it turns itself.
+std::vector<std::uint32_t> one_of_each_cube(std::span<const Eigen::Vector3f> points,
+                                            std::span<const std::uint32_t> chosen,
+                                            float inverse_spacing) {
   // So many cubes are worked out at once, in vector registers.
   constexpr std::size_t block_size = 16;
   using Block = Eigen::Array<float, block_size, 1>;
   using Cubes = Eigen::Array<int, block_size, 1>;
   TakenCubes taken;
+  ScatteredWindows order(chosen.size());
   std::vector<std::uint32_t> kept(chosen.size());
   std::size_t count = 0;
   Block x = Block::Zero(), y = Block::Zero(), z = Block::Zero();
   for (std::size_t begin = 0; begin < chosen.size(); begin += block_size) {
-    const auto some = chosen.subspan(begin, std::min(block_size, chosen.size() - begin));
-    for (std::size_t k = 0; k < some.size(); ++k) {
+    std::array<std::uint32_t, block_size> some;
+    const std::size_t size = std::min(block_size, chosen.size() - begin);
+    for (std::size_t k = 0; k < size; ++k) some[k] = chosen[order.next()];
+    for (std::size_t k = 0; k < size; ++k) {
       const auto lane = static_cast<Eigen::Index>(k);
       const Eigen::Vector3f& p = points[some[k]];
       x[lane] = p.x();
@@ -242,7 +292,7 @@ std::vector<std::uint32_t> first_in_cubes(std::span<const Eigen::Vector3f> point
     const Cubes cube_x = (x * inverse_spacing).floor().cast<int>();
     const Cubes cube_y = (y * inverse_spacing).floor().cast<int>();
     const Cubes cube_z = (z * inverse_spacing).floor().cast<int>();
-    for (std::size_t k = 0; k < some.size(); ++k) {
+    for (std::size_t k = 0; k < size; ++k) {
       const auto lane = static_cast<Eigen::Index>(k);
       kept[count] = some[k];
       count += taken.take(cube_x[lane], cube_y[lane], cube_z[lane]) ? 1 : 0;
@@ -257,21 +307,20 @@ std::vector<std::uint32_t> first_in_cubes(std::span<const Eigen::Vector3f> point
 std::vector<std::uint32_t> voxel_downsample(std::span<const Eigen::Vector3f> points,
                                             std::span<const std::uint32_t> chosen,
                                             double spacing_m) {
-  // The first point of a cube is the first one in its block, too.
   constexpr std::size_t block_size = 16384;
   const auto inverse_spacing = static_cast<float>(1.0 / spacing_m);
   const std::size_t blocks = chosen.size() / block_size + 1;
-  if (blocks == 1) return first_in_cubes(points, chosen, inverse_spacing);
+  if (blocks == 1) return one_of_each_cube(points, chosen, inverse_spacing);
   std::vector<std::vector<std::uint32_t>> of_block(blocks);
   tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t k) {
     const std::size_t begin = k * block_size;
     const auto block = chosen.subspan(begin, std::min(block_size, chosen.size() - begin));
-    of_block[k] = first_in_cubes(points, block, inverse_spacing);
+    of_block[k] = one_of_each_cube(points, block, inverse_spacing);
   });
   std::vector<std::uint32_t> candidates;
   for (const auto& block : of_block)
     candidates.insert(candidates.end(), block.begin(), block.end());
-  return first_in_cubes(points, candidates, inverse_spacing);
+  return one_of_each_cube(points, candidates, inverse_spacing);
 }
 
 std::vector<std::uint32_t> few_surfaces(const Scan& scan, const FeatureConfig& config,
