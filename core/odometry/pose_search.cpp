@@ -441,9 +441,8 @@ bool is_foretold(const OdometryResult& found, const FeatureSets& features, const
 OdometryResult search_near_prediction(const FeatureSets& features, const LocalMap& map,
                                       const PosePrediction& prediction, const FitStatistics& fits,
                                       const OdometryConfig& config) {
-  constexpr bool is_first_motion = false;
   const FeatureSets some = downsampled(features);
-  BestStart best(prediction.T_map_lidar, is_first_motion, some, map, fits, config);
+  BestStart best(prediction.T_map_lidar, /*is_first_motion=*/false, some, map, fits, config);
   static_cast<void>(is_settled_from(prediction.T_map_lidar, some, map, config, best));
   return refined(best.result(), features, map, config);
 }
@@ -466,9 +465,8 @@ OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,
     if (is_settled_from(prediction.T_map_lidar, features, map, config, best)) return best.result();
     // The motion of the last scan whatever the stamps say, and none.
     for (const Eigen::Isometry3d& T :
-         {Eigen::Isometry3d(last.T_map_lidar * last.motion), last.T_map_lidar}) {
+         {Eigen::Isometry3d(last.T_map_lidar * last.motion), last.T_map_lidar})
       if (best.take(register_in_two_stages(features, map, T, config))) return best.result();
-    }
   }
   if (is_first_motion && !config.paper_exact) {
     search_first_motion(features, map, last, prediction.T_map_lidar, config, best);

@@ -181,7 +181,7 @@ TEST(CrowdedDrives, KeepASparseLidarLevel) {
   SimulationConfig config = crowded_street();
   config.seed = 4;
   const Eigen::Isometry3d off = error_over(config, 1780, 40);
-  EXPECT_LT(angle_deg(off), 0.8);
+  EXPECT_LT(angle_deg(off), 0.6);
   EXPECT_LT(off.translation().norm(), 0.15);
 }
 
