@@ -7,11 +7,13 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
 #include <span>
 #include <utility>
 
 #include "core/lidar/voxel_index.hpp"
+#include "core/odometry/voxel_downsample.hpp"
 
 namespace stillmap {
 namespace {
@@ -146,62 +148,6 @@ std::vector<bool> unreliable_points(std::span<const Eigen::Vector3f> ring) {
   return unreliable;
 }
 
-/// Cubes of space that are taken, 64 to a brick of 4 x 4 x 4: points that were measured one after
-/// the other mostly share a brick, and no look-up is needed for them.
-class TakenCubes {
- public:
-  TakenCubes() : slots_(initial_slots) {}
-
-  /// Whether it was free until now.
-  bool take(int x, int y, int z) {
-    const std::uint64_t brick = packed_index(x >> 2, y >> 2, z >> 2);
-    if (brick != brick_) go_to(brick);
-    const int place = (x & 3) << 4 | (y & 3) << 2 | (z & 3);
-    const std::uint64_t bit = std::uint64_t{1} << place;
-    const bool was_free = (taken_ & bit) == 0;
-    taken_ |= bit;
-    return was_free;
-  }
-
- private:
-  static constexpr std::size_t initial_slots = 2048;
-  static constexpr std::uint64_t unused = ~std::uint64_t{0};
-  struct Slot {
-    std::uint64_t brick = unused;
-    std::uint64_t taken = 0;
-  };
-
-  [[nodiscard]] std::size_t slot_of(std::uint64_t brick) const {
-    std::size_t slot = IndexHash{}(brick) & (slots_.size() - 1);
-    while (slots_[slot].brick != unused && slots_[slot].brick != brick)
-      slot = (slot + 1) & (slots_.size() - 1);
-    return slot;
-  }
-  void go_to(std::uint64_t brick) {
-    if (brick_ != unused) slots_[slot_].taken = taken_;
-    brick_ = brick;
-    slot_ = slot_of(brick);
-    taken_ = slots_[slot_].taken;
-    if (slots_[slot_].brick == brick) return;
-    slots_[slot_].brick = brick;
-    if (2 * ++bricks_ > slots_.size()) grow();
-  }
-  void grow() {
-    std::vector<Slot> old(2 * slots_.size());
-    old.swap(slots_);
-    for (const Slot& slot : old)
-      if (slot.brick != unused) slots_[slot_of(slot.brick)] = slot;
-    slot_ = slot_of(brick_);
-  }
-
-  std::vector<Slot> slots_;
-  std::size_t bricks_ = 0;
-  /// The last brick: what is taken of it, and where that belongs.
-  std::uint64_t brick_ = unused;
-  std::uint64_t taken_ = 0;
-  std::size_t slot_ = 0;
-};
-
 }  // namespace
 
 std::vector<float> ring_curvature(const std::vector<Eigen::Vector3f>& ring) {
@@ -215,112 +161,6 @@ std::vector<float> ring_curvature(const std::vector<Eigen::Vector3f>& ring) {
     curvature[i] = sum.squaredNorm();
   }
   return curvature;
-}
-
-namespace {
-
-/// Numbers 0 to n - 1, each once, in steps of the golden section.
-class ScatteredOrder {
- public:
-  explicit ScatteredOrder(std::size_t n)
-      : size_(n), step_(static_cast<std::size_t>(0.618034 * static_cast<double>(n))), next_(n / 2) {
-    while (std::gcd(step_, size_) > 1) ++step_;
-  }
-  std::size_t next() {
-    const std::size_t here = next_;
-    next_ += step_;
-    if (next_ >= size_) next_ -= size_;
-    return here;
-  }
-
- private:
-  std::size_t size_;
-  std::size_t step_;
-  std::size_t next_;
-};
-
-/// The same of many things, by windows of neighbours, which stay in the processor's cache.
-class ScatteredWindows {
- public:
-  explicit ScatteredWindows(std::size_t n)
-      : size_(n), windows_((n + window_size - 1) / window_size), in_window_(0) {}
-  std::size_t next() {
-    if (left_ == 0) {
-      first_ = windows_.next() * window_size;
-      left_ = std::min(window_size, size_ - first_);
-      in_window_ = ScatteredOrder(left_);
-    }
-    --left_;
-    return first_ + in_window_.next();
-  }
-
- private:
-  static constexpr std::size_t window_size = 128;
-  std::size_t size_;
-  std::size_t first_ = 0;
-  std::size_t left_ = 0;
-  ScatteredOrder windows_;
-  ScatteredOrder in_window_;
-};
-
-/// The one of each cube that is visited first. In the order of the scan that is the one on the side
-/// that the lidar looks at first: of such points every scan turned the lidar a little, always the
-/// way that it turns itself.
-std::vector<std::uint32_t> one_of_each_cube(std::span<const Eigen::Vector3f> points,
-                                            std::span<const std::uint32_t> chosen,
-                                            float inverse_spacing) {
-  // So many cubes are worked out at once, in vector registers.
-  constexpr std::size_t block_size = 16;
-  using Block = Eigen::Array<float, block_size, 1>;
-  using Cubes = Eigen::Array<int, block_size, 1>;
-  TakenCubes taken;
-  ScatteredWindows order(chosen.size());
-  std::vector<std::uint32_t> kept(chosen.size());
-  std::size_t count = 0;
-  Block x = Block::Zero(), y = Block::Zero(), z = Block::Zero();
-  for (std::size_t begin = 0; begin < chosen.size(); begin += block_size) {
-    std::array<std::uint32_t, block_size> some;
-    const std::size_t size = std::min(block_size, chosen.size() - begin);
-    for (std::size_t k = 0; k < size; ++k) some[k] = chosen[order.next()];
-    for (std::size_t k = 0; k < size; ++k) {
-      const auto lane = static_cast<Eigen::Index>(k);
-      const Eigen::Vector3f& p = points[some[k]];
-      x[lane] = p.x();
-      y[lane] = p.y();
-      z[lane] = p.z();
-    }
-    const Cubes cube_x = (x * inverse_spacing).floor().cast<int>();
-    const Cubes cube_y = (y * inverse_spacing).floor().cast<int>();
-    const Cubes cube_z = (z * inverse_spacing).floor().cast<int>();
-    for (std::size_t k = 0; k < size; ++k) {
-      const auto lane = static_cast<Eigen::Index>(k);
-      kept[count] = some[k];
-      count += taken.take(cube_x[lane], cube_y[lane], cube_z[lane]) ? 1 : 0;
-    }
-  }
-  kept.resize(count);
-  return kept;
-}
-
-}  // namespace
-
-std::vector<std::uint32_t> voxel_downsample(std::span<const Eigen::Vector3f> points,
-                                            std::span<const std::uint32_t> chosen,
-                                            double spacing_m) {
-  constexpr std::size_t block_size = 16384;
-  const auto inverse_spacing = static_cast<float>(1.0 / spacing_m);
-  const std::size_t blocks = chosen.size() / block_size + 1;
-  if (blocks == 1) return one_of_each_cube(points, chosen, inverse_spacing);
-  std::vector<std::vector<std::uint32_t>> of_block(blocks);
-  tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t k) {
-    const std::size_t begin = k * block_size;
-    const auto block = chosen.subspan(begin, std::min(block_size, chosen.size() - begin));
-    of_block[k] = one_of_each_cube(points, block, inverse_spacing);
-  });
-  std::vector<std::uint32_t> candidates;
-  for (const auto& block : of_block)
-    candidates.insert(candidates.end(), block.begin(), block.end());
-  return one_of_each_cube(points, candidates, inverse_spacing);
 }
 
 std::vector<std::uint32_t> few_surfaces(const Scan& scan, const FeatureConfig& config,

@@ -51,11 +51,4 @@ struct Features {
 /// NaN where the ring has too few neighbours or jumps in depth.
 [[nodiscard]] std::vector<float> ring_curvature(const std::vector<Eigen::Vector3f>& ring_lidar);
 
-/// One of the `chosen` points in every cube of `spacing_m`, on no side of it more often than on
-/// others; indices into `points`. At 0.5 m a wall of 10 m x 3 m keeps about 120 points, however
-/// near it is.
-[[nodiscard]] std::vector<std::uint32_t> voxel_downsample(std::span<const Eigen::Vector3f> points,
-                                                          std::span<const std::uint32_t> chosen,
-                                                          double spacing_m);
-
 }  // namespace stillmap

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/odometry/features.hpp"
+#include "core/odometry/voxel_downsample.hpp"
 
 namespace stillmap {
 namespace {
