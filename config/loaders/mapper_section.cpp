@@ -75,6 +75,9 @@ void read_registration(YamlSection section, RegistrationConfig& registration) {
   section.number("min_plane_width", registration.min_plane_width, shares);
   section.integer("sparse_ring_neighbours", registration.sparse_ring_neighbours, {5, 16});
   section.number("sparse_ring_plane_width", registration.sparse_ring_plane_width, shares);
+  section.number("plane_deviation_m", registration.plane_deviation_m, {0, 10});
+  section.number("sparse_ring_plane_deviation_m", registration.sparse_ring_plane_deviation_m,
+                 {0, 10});
   section.number("max_extrapolation", registration.max_extrapolation, {0, 100});
   section.integer("min_correspondences", registration.min_correspondences, {6, 100000});
   section.number("min_observability", registration.min_observability, shares);

@@ -100,7 +100,9 @@ std::optional<FittedSurface> plane_of(const Moments& moments, const Neighbours& 
     const Eigen::Vector3d d = neighbours.points[k].position_map.cast<double>() - moments.centre;
     if (std::abs(normal->dot(d)) > plane_thickness_m) return std::nullopt;
   }
-  return FittedSurface{moments.centre, {*normal, Eigen::Vector3d::Zero()}, 1};
+  FittedSurface plane{moments.centre, {*normal, Eigen::Vector3d::Zero()}, 1};
+  plane.variance_m2 = normal->dot(moments.covariance * *normal);
+  return plane;
 }
 
 }  // namespace

@@ -20,6 +20,8 @@ struct FittedSurface {
   std::size_t normal_count = 1;
   /// What the distance along each normal counts, 0..1, beside the weight of eq. (10).
   std::array<double, 2> weights{1.0, 1.0};
+  /// Of a plane: variance of its neighbours across it [m^2].
+  double variance_m2 = 0.0;
 };
 
 /// Line through neighbours by PCA, eq. (5)-(7) with the ordinary covariance (as printed, eq. 6 is

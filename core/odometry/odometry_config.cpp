@@ -77,6 +77,11 @@ void check(const RegistrationConfig& c, const LocalMapConfig& map, FaultList& fa
                  "registration.min_plane_width", c.min_plane_width, "within 0..1");
   faults.require(c.sparse_ring_plane_width >= 0.0 && c.sparse_ring_plane_width < 1.0,
                  "registration.sparse_ring_plane_width", c.sparse_ring_plane_width, "within 0..1");
+  faults.require(c.plane_deviation_m >= 0.0, "registration.plane_deviation_m", c.plane_deviation_m,
+                 "0 or more");
+  faults.require(c.sparse_ring_plane_deviation_m >= 0.0,
+                 "registration.sparse_ring_plane_deviation_m", c.sparse_ring_plane_deviation_m,
+                 "0 or more");
   faults.require(c.across_rings_weight >= 0.0 && c.across_rings_weight <= 1.0,
                  "registration.across_rings_weight", c.across_rings_weight, "within 0..1");
   faults.require(c.max_extrapolation >= 0.0 && c.max_extrapolation <= 100.0,
@@ -117,7 +122,11 @@ std::string OdometryConfig::faults() const {
 
 OdometryConfig OdometryConfig::with_method() const {
   OdometryConfig used = *this;
-  if (weighting == Weighting::none || paper_exact) used.registration.robust_scale_m = 0.0;
+  if (weighting == Weighting::none || paper_exact) {
+    used.registration.robust_scale_m = 0.0;
+    used.registration.plane_deviation_m = 0.0;
+    used.registration.sparse_ring_plane_deviation_m = 0.0;
+  }
   if (paper_exact) {
     used.motion.use_range_image_history = false;
     used.registration.across_rings_weight = 1.0;

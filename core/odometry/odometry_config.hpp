@@ -99,6 +99,14 @@ struct RegistrationConfig {
   /// plane that leans over takes the lidar along. Lines along their rings do not count at all.
   int sparse_ring_neighbours = 16;
   double sparse_ring_plane_width = 0.5;
+  /// A plane counts s^2 / (s^2 + v), where v is the variance of its neighbours across it and s this
+  /// [m]: a thick one is foliage, or the road with what drove over it, which stands on it and
+  /// lifted every scan a little. Counts once registration is near its end: from farther off thick
+  /// ones, such as corners, lead the way, too. Not in the paper; 0 switches it off.
+  /// Weighting::none goes without it.
+  double plane_deviation_m = 0.03;
+  /// The same of lidars whose rings are far apart, with more and farther neighbours.
+  double sparse_ring_plane_deviation_m = 0.05;
   /// Of a lidar with rings: a plane tells little of a point that lies farther than this from the
   /// middle of its neighbours, along the plane, in standard deviations of theirs (a Mahalanobis
   /// distance): the few rings of the scans before, which err together, turn the plane about

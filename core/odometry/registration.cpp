@@ -29,6 +29,8 @@ struct Correspondence {
   FittedSurface surface;
   double inconsistency = 0.0;
   double sweep_part = 0.0;
+  /// What a plane counts by how thin it is, 0..1.
+  double thinness = 1.0;
   bool found = false;
   bool in_known_space = false;
   /// Where the neighbours were looked up; NaN: not yet.
@@ -64,6 +66,8 @@ void look_up(const FeaturePoint& feature, FeatureKind kind, const FeatureMap& ma
   const auto surface = fit(kind, neighbours, config.min_plane_width);
   found.found = surface.has_value();
   if (!surface) return;
+  const double thin_m2 = config.plane_deviation_m * config.plane_deviation_m;
+  found.thinness = thin_m2 > 0.0 ? thin_m2 / (thin_m2 + surface->variance_m2) : 1.0;
   found.surface =
       weighed_ring_line(*surface, found.point_lidar, R_map_lidar, config.across_rings_weight);
   if (config.max_extrapolation > 0.0 && surface->normal_count == 1 &&
@@ -147,7 +151,7 @@ bool lies_on_level_plane(const FittedSurface& surface) {
 }
 
 NormalEquations build_normal_equations(std::span<const Correspondence> correspondences,
-                                       std::size_t edge_count, bool rolling,
+                                       std::size_t edge_count, bool rolling, bool weighs_planes,
                                        const Eigen::Isometry3d& T_map_lidar,
                                        const OdometryConfig& config) {
   NormalEquations equations;
@@ -166,7 +170,8 @@ NormalEquations build_normal_equations(std::span<const Correspondence> correspon
     equations.on_level_planes += is_level ? 1 : 0;
     equations.upright_scores += is_level ? 0.0 : score;
     const double w = weight(config.weighting, config.alpha, distance, c.inconsistency) *
-                     geman_mcclure(config.registration.robust_scale_m, squared);
+                     geman_mcclure(config.registration.robust_scale_m, squared) *
+                     (weighs_planes ? c.thinness : 1.0);
     if (w <= 0.0) continue;
     for (std::size_t k = 0; k < r.count; ++k) {
       const double w_k = w * c.surface.weights[k];
@@ -312,6 +317,15 @@ class ErrorDirections {
   Eigen::SelfAdjointEigenSolver<Matrix6d> eigen_;
 };
 
+/// Whether it is no longer than so many steps below which registration has converged.
+bool is_small(const PoseTangent& tangent, double steps, const RegistrationConfig& limits) {
+  return tangent.head<3>().norm() < steps * limits.step_translation_m &&
+         tangent.tail<3>().norm() < steps * limits.step_rotation_rad;
+}
+
+/// Planes are weighed by their thickness once a step is shorter than so many of those.
+constexpr double near_steps = 10.0;
+
 /// Moves the pose, and with a `sweep_prior` the motion within the sweep, by one step. `equations`
 /// are those of the pose alone afterwards. Returns whether a direction is not observed.
 bool take_step(const SweepPrior* sweep_prior, const RegistrationConfig& limits,
@@ -331,11 +345,7 @@ bool take_step(const SweepPrior* sweep_prior, const RegistrationConfig& limits,
     result.sweep_correction += sweep_step;
   }
   result.T_map_lidar = boxplus(result.T_map_lidar, step);
-  const auto is_small = [&](const PoseTangent& tangent) {
-    return tangent.head<3>().norm() < limits.step_translation_m &&
-           tangent.tail<3>().norm() < limits.step_rotation_rad;
-  };
-  result.converged = is_small(step) && is_small(0.5 * sweep_step);
+  result.converged = is_small(step, 1.0, limits) && is_small(sweep_step, 2.0, limits);
   return !directions.are_observed();
 }
 
@@ -401,6 +411,7 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
   if (features.sparse_rings) {
     limits.neighbours = limits.sparse_ring_neighbours;
     limits.min_plane_width = limits.sparse_ring_plane_width;
+    limits.plane_deviation_m = limits.sparse_ring_plane_deviation_m;
     limits.across_rings_weight = 0.0;
   }
   OdometryResult result;
@@ -413,6 +424,7 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
   const std::span all(correspondences);
   NormalEquations equations;
   bool degenerate = false;
+  bool weighs_planes = false;
   for (; result.iterations < limits.max_iterations && !result.converged; ++result.iterations) {
     find_correspondences(features.edges, FeatureKind::edge, map.edges, result, limits,
                          all.first(edge_count));
@@ -420,10 +432,14 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
                          all.subspan(edge_count, plane_count));
     find_correspondences(features.surfaces, FeatureKind::surface, map.planes, result, limits,
                          all.subspan(edge_count + plane_count));
-    equations =
-        build_normal_equations(correspondences, edge_count, rolling, result.T_map_lidar, config);
+    equations = build_normal_equations(correspondences, edge_count, rolling, weighs_planes,
+                                       result.T_map_lidar, config);
     if (equations.count() < limits.min_correspondences) break;
+    const Eigen::Isometry3d before = result.T_map_lidar;
     degenerate = take_step(rolling ? &features.sweep_prior : nullptr, limits, equations, result);
+    if (weighs_planes || limits.plane_deviation_m == 0.0) continue;
+    weighs_planes = is_small(boxminus(result.T_map_lidar, before), near_steps, limits);
+    if (weighs_planes) result.converged = false;
   }
   take_fit(all, equations, result);
   if (equations.count() < limits.min_correspondences || !result.T_map_lidar.matrix().allFinite()) {
@@ -443,6 +459,7 @@ OdometryResult register_in_two_stages(const FeatureSets& features, const LocalMa
   OdometryConfig wide = config;
   wide.weighting = Weighting::none;
   wide.registration.robust_scale_m = 0.0;
+  wide.registration.plane_deviation_m = wide.registration.sparse_ring_plane_deviation_m = 0.0;
   const OdometryResult first = register_features(features, map, T_map_lidar_predicted, wide);
   if (first.health == OdometryHealth::lost) return first;
   OdometryResult second =
@@ -455,6 +472,7 @@ OdometryConfig coarse_registration_config(OdometryConfig config) {
   config.registration.sweep_translation_m = 0.0;
   config.weighting = Weighting::none;
   config.registration.robust_scale_m = 0.5;
+  config.registration.plane_deviation_m = config.registration.sparse_ring_plane_deviation_m = 0.0;
   config.registration.max_neighbour_distance_m = coarse_reach_m;
   config.registration.max_residual_m = coarse_reach_m;
   config.registration.max_iterations = 50;

@@ -124,6 +124,14 @@ TEST(FitPlane, ResidualIsTheDistanceOfEquation12) {
   }
 }
 
+TEST(FitPlane, IsAsThickAsItsPointsDeviate) {
+  const std::vector<Eigen::Vector3d> points{
+      {0.0, 0.0, 0.1}, {1.0, 0.0, -0.1}, {1.0, 1.0, 0.1}, {0.0, 1.0, -0.1}, {0.5, 0.5, 0.0}};
+  const auto plane = fit_plane(neighbours_at(points));
+  ASSERT_TRUE(plane);
+  EXPECT_NEAR(plane->variance_m2, 4.0 * 0.01 / 5.0, 1e-6);
+}
+
 TEST(FitPlane, NoisyPointsGiveThePlaneNearly) {
   std::mt19937 random(5);
   for (int k = 0; k < 200; ++k) {

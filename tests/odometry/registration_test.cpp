@@ -4,6 +4,7 @@
 #include <tbb/global_control.h>
 
 #include <Eigen/Eigenvalues>
+#include <random>
 
 #include "tests/odometry/poses.hpp"
 #include "tests/odometry/surface_world.hpp"
@@ -180,6 +181,27 @@ TEST(RegisterFeatures, SemanticsHoldAgainstAMovedThirdOfTheScene) {
   EXPECT_LT(semantic, 0.6 * none);
   // As shipped.
   EXPECT_LT(scene.error_m(OdometryConfig{}), 0.5 * semantic);
+}
+
+/// Traffic without labels leaves its lower edges in the map, a hand's breadth above the road.
+TEST(RegisterFeatures, WhatDroveOverTheRoadHardlyLiftsTheScan) {
+  LocalMap map = courtyard().local_map();
+  std::mt19937 random(31);
+  std::uniform_real_distribution<float> x_m(-15.0F, 15.0F), y_m(-6.0F, 6.0F), z_m(-1.55F, -1.4F);
+  for (int k = 0; k < 1000; ++k)
+    map.planes.insert({{{{x_m(random), y_m(random), z_m(random)}, SemanticClass::unlabeled}}});
+  OdometryConfig config;
+  config.registration.plane_deviation_m = 0.0;
+  const FeatureSets features = courtyard().features(T_true, 0.01, 32);
+  const auto lifted_m = [&] {
+    const OdometryResult found = register_features(features, map, T_true, config);
+    EXPECT_EQ(found.health, OdometryHealth::good);
+    return found.T_map_lidar.translation().z() - T_true.translation().z();
+  };
+  const double all_alike_m = lifted_m();
+  config.registration.plane_deviation_m = 0.03;
+  EXPECT_GT(all_alike_m, 0.005);
+  EXPECT_LT(std::abs(lifted_m()), 0.5 * all_alike_m);
 }
 
 TEST(RegisterFeatures, AnInconsistentLabelCountsByItsConfidence) {
