@@ -101,7 +101,7 @@ TEST(CrowdedDrives, FollowASparseLidarThroughDenseTrafficWithoutLabels) {
   unlabelled.sensor = config.sensor;
   Mapper mapper(unlabelled, std::make_unique<NullSegmenter>());
   Eigen::Isometry3d T_map_last = Eigen::Isometry3d::Identity();
-  constexpr int first = 60;
+  constexpr int first = 40;
   for (int k = first; k < config.scans; ++k) {
     const auto mapped = mapper.process(simulation.scan(k).scan);
     ASSERT_TRUE(mapped);
