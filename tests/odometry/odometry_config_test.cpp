@@ -64,6 +64,10 @@ INSTANTIATE_TEST_SUITE_P(
         FaultCase{"registration.min_correspondences",
                   [](C& c) { c.registration.min_correspondences = 5; }},
         FaultCase{"registration.sweep_tilt_rad", [](C& c) { c.registration.sweep_tilt_rad = 0.0; }},
+        FaultCase{"registration.plane_deviation_m",
+                  [](C& c) { c.registration.plane_deviation_m = -0.1; }},
+        FaultCase{"registration.sparse_ring_plane_deviation_m",
+                  [](C& c) { c.registration.sparse_ring_plane_deviation_m = -0.1; }},
         FaultCase{"registration.max_extrapolation",
                   [](C& c) { c.registration.max_extrapolation = -1.0; }},
         FaultCase{"registration.across_rings_weight",
@@ -95,6 +99,9 @@ TEST(OdometryConfig, BeginsAMapWithTheKernelUnlessTheMethodIsThePapers) {
   OdometryConfig none;
   none.weighting = Weighting::none;
   EXPECT_EQ(none.with_method().registration.robust_scale_m, 0.0);
+  EXPECT_EQ(none.with_method().registration.plane_deviation_m, 0.0);
+  EXPECT_EQ(none.with_method().registration.sparse_ring_plane_deviation_m, 0.0);
+  EXPECT_GT(OdometryConfig{}.with_method().registration.plane_deviation_m, 0.0);
   EXPECT_EQ(none.at_start().registration.robust_scale_m, none.registration.robust_scale_m);
   EXPECT_EQ(none.at_start().at_start().registration.robust_scale_m,
             none.registration.robust_scale_m)
