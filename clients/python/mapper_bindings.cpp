@@ -162,6 +162,13 @@ void bind_mapper(py::module_& module) {
       .def("add_imu", &add_imu, py::arg("stamp_ns"), py::arg("angular_velocity_imu"),
            py::arg("acceleration_imu"),
            "A sample of the IMU [rad/s, m/s^2], before the scans that end after it.")
+      .def(
+          "reset",
+          [](SharedMapper& shared) {
+            shared.with([](Mapper& mapper) { mapper.reset(new_map_id()); });
+          },
+          "Begins a new map at the next scan, whose pose is its origin; the lidar goes on as it "
+          "moved.")
       .def_property_readonly(
           "trajectory",
           [](SharedMapper& shared) {

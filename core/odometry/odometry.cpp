@@ -127,6 +127,7 @@ void Odometry::begin_map(const std::optional<double>& reach_m) {
     next.last.motion = state.last.motion;
     next.last.interval_s = state.last.interval_s;
     next.intervals = state.intervals;
+    next.goes_on = true;
   }
   state = std::move(next);
 }
@@ -138,6 +139,7 @@ void Odometry::expect_first_scan(std::int64_t stamp_ns) {
   if (since_last_s > 0.0 && since_last_s <= max_prediction_s) return;
   state.last = {};
   state.intervals = ScanIntervals(state.sensor.period_s);
+  state.goes_on = false;
 }
 
 }  // namespace stillmap

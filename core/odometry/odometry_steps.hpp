@@ -80,8 +80,9 @@ struct Odometry::State {
   void confirm(const FeatureSets& features, const PosePrediction& prediction,
                OdometryResult& result) const {
     if (!started || config.paper_exact || result.health == OdometryHealth::lost) return;
-    result = fits.are_known() ? confirmed_by_points(result, features, map, method())
-                              : confirmed_at_start(result, features, map, has_prior_map, method());
+    result = fits.are_known()
+                 ? confirmed_by_points(result, features, map, method())
+                 : confirmed_at_start(result, features, map, has_prior_map || goes_on, method());
     keep_to_limits(last, prediction, !has_jumped, sensor.motion_limits, result);
   }
   /// Calls a pose good only where the map says so that is older than any doubt of the place.
@@ -124,6 +125,8 @@ struct Odometry::State {
   std::optional<UnconfirmedStretch> stretch;
   bool started = false;
   bool has_prior_map = false;
+  /// The lidar moves as it did in the map before this one.
+  bool goes_on = false;
   /// The last motion was none of the robot: a place was found again, or a prior corrected itself.
   bool has_jumped = false;
   /// Scans in a row that could not be registered.

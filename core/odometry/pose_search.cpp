@@ -386,9 +386,9 @@ OdometryResult confirmed_by_points(const OdometryResult& found, const FeatureSet
 }
 
 OdometryResult confirmed_at_start(const OdometryResult& found, const FeatureSets& features,
-                                  const LocalMap& map, bool has_prior_map,
+                                  const LocalMap& map, bool is_start_known,
                                   const OdometryConfig& config) {
-  if (has_prior_map) {
+  if (is_start_known) {
     const OdometryResult confirmed = confirmed_by_points(found, features, map, config);
     if (confirmed.health == OdometryHealth::good &&
         confirmed.point_deviation_m < max_first_deviation_m)

@@ -82,10 +82,11 @@ struct PosePrediction {
 /// The same of one of the first scans, which little is known to judge by. What of a sparse lidar's
 /// rings lies on the road goes along with it, and pulls two sparse scans together by up to a metre:
 /// where the points align clearly better some way off, the pose there, degenerate, with its tilt
-/// and height as the features have them. In a map made earlier only where the points do not stay.
+/// and height as the features have them. Where the start is known (in a map made earlier, or of a
+/// lidar that goes on as it moved) only where the points do not stay.
 [[nodiscard]] OdometryResult confirmed_at_start(const OdometryResult& found,
                                                 const FeatureSets& features, const LocalMap& map,
-                                                bool has_prior_map, const OdometryConfig& config);
+                                                bool is_start_known, const OdometryConfig& config);
 
 /// `found`, but no pose that was found without a robust kernel is good unless it stays where it is
 /// with one: traffic pulls the one along, and not the other.

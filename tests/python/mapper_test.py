@@ -141,3 +141,19 @@ def test_threads_share_a_mapper(city):
     end.set()
     looking.join()
     assert len(mapper.trajectory) == len(dataset)
+
+
+def test_a_reset_begins_a_map_in_which_the_lidar_goes_on(city):
+    dataset = stillmap.open_dataset(city)
+    mapper = stillmap.Mapper(dataset.sensor)
+    before = [mapper.process(scan).T_map_lidar for scan in dataset]
+    half = len(dataset) // 2
+    mapper = stillmap.Mapper(dataset.sensor)
+    for scan in list(dataset)[:half]:
+        mapper.process(scan)
+    mapper.reset()
+    assert len(mapper.map()) == 0
+    after = [mapper.process(scan).T_map_lidar for scan in list(dataset)[half:]]
+    np.testing.assert_array_equal(after[0], np.eye(4))
+    moved = np.linalg.inv(before[half]) @ before[-1]
+    np.testing.assert_allclose(after[-1], moved, atol=0.1)
