@@ -57,8 +57,12 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
       return can_begin_map(features, config) ? OdometryResult{.T_map_lidar = prediction.T_map_lidar}
                                              : lost_at(prediction.T_map_lidar);
     }
-    return relocalize(features, prior_map, map, prediction.T_map_lidar, method(),
-                      is_searched_widely() ? first_reach_m : 0.0);
+    const OdometryResult found = relocalize(features, prior_map, map, prediction.T_map_lidar,
+                                            method(), is_searched_widely() ? first_reach_m : 0.0);
+    // Rings on the road, and what drives along with the lidar, lie well on where it was last, too.
+    return found.health == OdometryHealth::lost || config.paper_exact
+               ? found
+               : confirmed_at_start(found, features, map, /*is_start_known=*/false, method());
   }
   // Few features tell the place sooner. Of the first scans all are needed.
   const bool is_rough = lost_scans > 0 || (fits.are_known() && !config.paper_exact);

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/mapper.hpp"
@@ -199,6 +200,34 @@ TEST(CrowdedDrives, KeepARollingSparseLidarLevel) {
 INSTANTIATE_TEST_SUITE_P(WithAndWithoutLabels, WeightingOfCrowdedDrives,
                          ::testing::Values(Weighting::semantic, Weighting::geometric,
                                            Weighting::none));
+
+/// A restart while everything round the lidar drives on with it: rings on the road and vehicles fit
+/// where it was last, too, a scan's way too far behind.
+TEST(CrowdedDrives, ARestartInTrafficWithoutLabelsFindsWhereItHasDriven) {
+  SimulationConfig config = crowded_street();
+  config.seed = 62;
+  config.scans = 105;
+  const Simulation simulation(config);
+  MapperConfig unlabelled;
+  unlabelled.sensor = config.sensor;
+  Mapper maker(unlabelled, std::make_unique<NullSegmenter>());
+  constexpr int restart = 100;
+  std::optional<MappedScan> mapped;
+  for (int k = 0; k < restart; ++k) mapped = maker.process(simulation.scan(k).scan);
+  ASSERT_TRUE(mapped);
+  Mapper mapper(unlabelled, std::make_unique<NullSegmenter>());
+  mapper.resume(*maker.map_snapshot());
+  std::optional<Eigen::Isometry3d> T_map_lidar_prior = mapped->odometry.T_map_lidar;
+  for (int k = restart; k < config.scans; ++k) {
+    mapped = mapper.process(simulation.scan(k).scan, std::exchange(T_map_lidar_prior, {}));
+    ASSERT_TRUE(mapped);
+    const Eigen::Isometry3d T_map_lidar_true =
+        simulation.T_map_lidar_at(0.0).inverse() *
+        simulation.T_map_lidar_at(k * config.sensor.period_s);
+    const Eigen::Isometry3d off = T_map_lidar_true.inverse() * mapped->odometry.T_map_lidar;
+    EXPECT_LT(off.translation().norm(), 0.2) << "scan " << k;
+  }
+}
 
 }  // namespace
 }  // namespace stillmap
