@@ -33,9 +33,16 @@ const std::vector<YamlSection::Choice<RingSource>>& ring_sources() {
   return sources;
 }
 
-std::string ring_source_name(RingSource wanted) {
-  for (const YamlSection::Choice<RingSource>& source : ring_sources()) {
-    if (source.value == wanted) return source.name;
+const std::vector<YamlSection::Choice<ScanPattern>>& scan_patterns() {
+  static const std::vector<YamlSection::Choice<ScanPattern>> patterns{
+      {"rings", ScanPattern::rings}, {"irregular", ScanPattern::irregular}};
+  return patterns;
+}
+
+template <class Value>
+std::string name_of(Value wanted, const std::vector<YamlSection::Choice<Value>>& choices) {
+  for (const YamlSection::Choice<Value>& choice : choices) {
+    if (choice.value == wanted) return choice.name;
   }
   assert(false);
   return {};
@@ -71,6 +78,7 @@ void read_motion_limits(YamlSection section, MotionLimits& limits) {
 void read_sensor(YamlSection& file, SensorModel& sensor) {
   file.require({"name", "rings", "fov_up_deg", "fov_down_deg"});
   file.text("name", sensor.name);
+  file.choice<ScanPattern>("pattern", sensor.pattern, scan_patterns());
   file.integer("rings", sensor.rings, {1, 1024});
   file.degrees("fov_up_deg", sensor.fov_up, {-90, 90});
   file.degrees("fov_down_deg", sensor.fov_down, {-90, 90});
@@ -93,6 +101,7 @@ void save_sensor(const SensorModel& sensor, const fs::path& file) {
   constexpr double degree = std::numbers::pi / 180.0;
   YAML::Emitter yaml;
   yaml << YAML::BeginMap << YAML::Key << "name" << YAML::Value << sensor.name;
+  yaml << YAML::Key << "pattern" << YAML::Value << name_of(sensor.pattern, scan_patterns());
   yaml << YAML::Key << "rings" << YAML::Value << sensor.rings;
   yaml << YAML::Key << "fov_up_deg" << YAML::Value << sensor.fov_up / degree;
   yaml << YAML::Key << "fov_down_deg" << YAML::Value << sensor.fov_down / degree;
@@ -104,7 +113,7 @@ void save_sensor(const SensorModel& sensor, const fs::path& file) {
   yaml << YAML::Key << "min_range_m" << YAML::Value << sensor.min_range_m;
   yaml << YAML::Key << "max_range_m" << YAML::Value << sensor.max_range_m;
   yaml << YAML::Key << "period_s" << YAML::Value << sensor.period_s;
-  yaml << YAML::Key << "ring_source" << YAML::Value << ring_source_name(sensor.ring_source);
+  yaml << YAML::Key << "ring_source" << YAML::Value << name_of(sensor.ring_source, ring_sources());
   yaml << YAML::Key << "intensity_scale" << YAML::Value << sensor.intensity_scale;
   if (sensor.imu) {
     const Eigen::Vector3d yaw_pitch_roll = sensor.imu->R_lidar_imu.eulerAngles(2, 1, 0) / degree;

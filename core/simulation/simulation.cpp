@@ -318,6 +318,9 @@ std::string SimulationConfig::faults() const {
     out += std::string("simulation.") + field + " is " + std::to_string(value) + ", must be " +
            std::to_string(low) + " to " + std::to_string(high) + '\n';
   };
+  if (sensor.pattern == ScanPattern::irregular)
+    out += "simulation.sensor '" + sensor.name +
+           "' has no rings: only lidars that turn are simulated\n";
   check(scans, 1, 100000, "scans");
   check(firings, 0, 10000, "firings");
   check(lidar_height_m, 0.3, 4.0, "lidar_height_m");

@@ -15,6 +15,7 @@ using ::testing::HasSubstr;
 
 void expect_same(const SensorModel& a, const SensorModel& b) {
   EXPECT_EQ(a.name, b.name);
+  EXPECT_EQ(a.pattern, b.pattern);
   EXPECT_EQ(a.rings, b.rings);
   EXPECT_NEAR(a.fov_up, b.fov_up, 1e-12);
   EXPECT_NEAR(a.fov_down, b.fov_down, 1e-12);
@@ -49,6 +50,15 @@ TEST(SensorFile, ShippedExampleCanBeUsed) {
   EXPECT_EQ(sensor.faults(), "");
 }
 
+TEST(SensorFile, ShippedLivoxFilesHaveNoRings) {
+  for (const std::string name : {"livox_avia", "livox_mid_360"}) {
+    SCOPED_TRACE(name);
+    const SensorModel sensor = load_sensor(shipped("sensors/" + name + ".yaml").string());
+    EXPECT_EQ(sensor.pattern, ScanPattern::irregular);
+    EXPECT_EQ(sensor.faults(), "");
+  }
+}
+
 TEST(SensorFile, WhatIsSavedIsReadBack) {
   SensorModel sensor = hdl_64e();
   sensor.name = "a name: with {yaml} in it";
@@ -63,6 +73,9 @@ TEST(SensorFile, WhatIsSavedIsReadBack) {
   sensor.motion_limits = {
       .max_speed_m_s = 2.5, .max_acceleration_m_s2 = 1.25, .max_turn_rate_rad_s = 0.75};
   const auto file = write_file("saved.yaml", "");
+  save_sensor(sensor, file);
+  expect_same(load_sensor(file.string()), sensor);
+  sensor.pattern = ScanPattern::irregular;
   save_sensor(sensor, file);
   expect_same(load_sensor(file.string()), sensor);
   save_sensor(vlp_16(), file);

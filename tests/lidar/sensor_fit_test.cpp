@@ -76,6 +76,7 @@ TEST(FitSensor, GivesALidarWithoutRingsBands) {
   const auto fitted = fit_sensor(scan);
   ASSERT_TRUE(fitted);
   EXPECT_THAT(fitted->faults(), IsEmpty());
+  EXPECT_EQ(fitted->pattern, ScanPattern::irregular);
   EXPECT_EQ(fitted->rings, 40);
   EXPECT_NEAR(fitted->fov_up, 52.0 * degree, 0.2 * degree);
   EXPECT_NEAR(fitted->fov_down, -7.0 * degree, 0.2 * degree);

@@ -44,6 +44,12 @@ TEST(Simulation, SameBitsOnOneThread) {
   expect_same(parallel, Simulation(small()).scan(5));
 }
 
+TEST(Simulation, ALidarWithoutRingsIsRefused) {
+  SimulationConfig config = small();
+  config.sensor.pattern = ScanPattern::irregular;
+  EXPECT_THAT(config.faults(), ::testing::HasSubstr("'VLP-16' has no rings"));
+}
+
 TEST(Simulation, AnotherSeedIsAnotherCity) {
   const SimulatedScan a = Simulation(small(1)).scan(0);
   const SimulatedScan b = Simulation(small(2)).scan(0);
