@@ -92,10 +92,10 @@ MapperConfig mapper_config(const MapperArguments& arguments, const SensorModel& 
   MapperConfig& config = server.mapper;
   if (!arguments.sensor.empty()) {
     config.sensor = load_sensor(arguments.sensor);
-    take_range_of_sensor(report, config);
   } else if (is_left_out(report, "sensor") && server.lidars.empty()) {
     config.sensor = suggested_sensor;
   }
+  take_range_of_sensor(report, config);
   if (!arguments.weighting.empty()) {
     config.odometry.weighting = weighting_from_name(arguments.weighting);
   }
