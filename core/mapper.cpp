@@ -289,7 +289,7 @@ void Mapper::resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidenc
 
 ResumedMap Mapper::resume(ResumedMap prepared) {
   ResumedMap until_now{std::exchange(static_map_.map(), std::move(prepared.map)),
-                       std::exchange(resumed_tiles_, {}), std::nullopt};
+                       std::exchange(resumed_tiles_, {}), std::exchange(begin_, std::nullopt)};
   clear_scan_state();
   resumed_tiles_ = std::move(prepared.tiles);
   begin_ = std::move(prepared.begin);

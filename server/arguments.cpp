@@ -19,7 +19,7 @@ constexpr const char* footer =
     "out under rt/stillmap/, as ROS 2 topics.\n"
     "\n"
     "Examples:\n"
-    "  stillmap-server                                    a 64-beam sensor, domain 0, map not "
+    "  stillmap-server                                    any one lidar, domain 0, map not "
     "kept\n"
     "  stillmap-server --config config/server/default.yaml --map-file city.stillmap\n"
     "  stillmap-server --delivery every                   for 'stillmap replay --lossless'\n"

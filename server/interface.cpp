@@ -14,7 +14,6 @@ ServerTraits traits(const ServerConfig& config, const InterfaceContext& context)
   return {
       .delivery = config.input.delivery,
       .label_source = context.mapping.label_source(),
-      .sensor = config.mapper.sensor.name,
       .points_topic = config.lidars.empty() ? config.topics.points : config.lidars.front().topic,
       .host_diagnostics = host_diagnostics(context.participant)};
 }

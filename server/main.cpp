@@ -7,6 +7,7 @@
 #include <cstring>
 #include <exception>
 #include <iostream>
+#include <memory>
 #include <set>
 #include <string>
 
@@ -47,6 +48,16 @@ std::string topics_of_scans(const stillmap::ServerConfig& config) {
   return text;
 }
 
+std::unique_ptr<stillmap::Segmenter> open_labels(const stillmap::ServerConfig& config,
+                                                 const stillmap::SensorModel& sensor) {
+  const bool adaptive_width = stillmap::server::segmentation_budget(config).count() > 0;
+  auto labels = stillmap::open_segmenter(config.labels, sensor, adaptive_width);
+  if (const std::string details = labels->details(); !details.empty()) {
+    spdlog::info("labels by {}: {}", labels->name(), details);
+  }
+  return labels;
+}
+
 /// Returns the exit code.
 int serve(const stillmap::ServerConfig& config) {
   sigset_t signals = stillmap::block_stop_signals();
@@ -56,14 +67,12 @@ int serve(const stillmap::ServerConfig& config) {
   // A reader of the log that ends first (tee) must not keep the map from being saved.
   static_cast<void>(std::signal(SIGPIPE, SIG_IGN));
   stillmap::server::start_tbb_workers();
-  const bool adaptive_width = stillmap::server::segmentation_budget(config).count() > 0;
-  auto labels = stillmap::open_segmenter(config.labels, config.mapper.sensor, adaptive_width);
-  if (const std::string details = labels->details(); !details.empty()) {
-    spdlog::info("labels by {}: {}", labels->name(), details);
+  stillmap::server::Server server(
+      config, [&](const stillmap::SensorModel& sensor) { return open_labels(config, sensor); });
+  if (!config.automatic_sensor.is_on) {
+    const auto hint = stillmap::better_model(config.labels, config.mapper.sensor);
+    if (!hint.empty()) spdlog::info("{}; labels.model chooses", hint);
   }
-  if (const auto hint = stillmap::better_model(config.labels, config.mapper.sensor); !hint.empty())
-    spdlog::info("{}; labels.model chooses", hint);
-  stillmap::server::Server server(config, std::move(labels));
   spdlog::info("ready: scans from {}, domain {}", topics_of_scans(config), config.dds.domain_id);
   if (config.map.file.empty())
     spdlog::info("the map is not kept in a file: map.file is empty, and --map-file was not given");

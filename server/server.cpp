@@ -40,7 +40,8 @@ ThrottleCallback throttle_callback(const ServerConfig& config, const BackgroundT
 }  // namespace
 
 struct Server::Parts {
-  Parts(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter);
+  Parts(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter,
+        const OpenSegmenter& open_segmenter);
 
   // In the order of construction: each part uses those above it, and ends before them.
   Statistics statistics;
@@ -58,7 +59,8 @@ struct Server::Parts {
   ThrottleRelease throttle_release{throttle};
 };
 
-Server::Parts::Parts(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter)
+Server::Parts::Parts(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter,
+                     const OpenSegmenter& open_segmenter)
     : service_log(statistics.metrics()),
       storage(config, segmenter->name(), statistics),
       topics(dds::Topics::in(config.topics.name_space)),
@@ -69,7 +71,7 @@ Server::Parts::Parts(const ServerConfig& config, std::unique_ptr<Segmenter> segm
                           participant, topics, config, statistics,
                           throttle_callback(config, throttle, SaturationPolicy::wait))
                     : std::nullopt),
-      mapping(config, std::move(segmenter),
+      mapping(config, std::move(segmenter), open_segmenter,
               {.storage = storage,
                .participant = participant,
                .topics = topics,
@@ -92,8 +94,9 @@ Server::Parts::Parts(const ServerConfig& config, std::unique_ptr<Segmenter> segm
   spdlog::info("metrics: http://{}/metrics", metrics->address());
 }
 
-Server::Server(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter)
-    : parts_(std::make_unique<Parts>(config, std::move(segmenter))) {}
+Server::Server(const ServerConfig& config, const OpenSegmenter& open_segmenter)
+    : parts_(
+          std::make_unique<Parts>(config, open_segmenter(config.mapper.sensor), open_segmenter)) {}
 
 Server::~Server() = default;
 

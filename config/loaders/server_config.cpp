@@ -23,9 +23,10 @@ namespace fs = std::filesystem;
 
 constexpr Range periods_s{0.01, 86400};
 
-void read_sensor_name(YamlSection& file, const fs::path& folder, SensorModel& sensor) {
-  std::string name = "hdl_64e";
-  file.text("sensor", name);
+constexpr const char* told_by_scans = "auto";
+
+void read_sensor(const std::string& name, YamlSection& file, const fs::path& folder,
+                 SensorModel& sensor) {
   try {
     sensor = load_sensor(name, folder);
   } catch (const ConfigError& error) {
@@ -298,7 +299,15 @@ LidarConfig read_lidar(YamlSection& section, const fs::path& folder) {
   LidarConfig lidar;
   section.require({"name", "sensor", "topic"});
   section.text("name", lidar.name);
-  read_sensor_name(section, folder, lidar.sensor);
+  std::string sensor;
+  section.text("sensor", sensor);
+  if (sensor == told_by_scans) {
+    section.fault("sensor",
+                  "'auto' is for one lidar: where several are merged, name each one's, built in or "
+                  "a sensor file");
+  } else {
+    read_sensor(sensor, section, folder, lidar.sensor);
+  }
   section.text("topic", lidar.topic);
   section.text("frame", lidar.frame);
   lidar.T_base_lidar = read_extrinsic(section);
@@ -354,6 +363,7 @@ void read_lidars(YamlSection& file, const fs::path& folder, ServerConfig& config
     sensors.push_back({lidar.sensor, T_merged_base * lidar.T_base_lidar});
   }
   config.mapper.sensor = merged_sensor(sensors);
+  config.automatic_sensor.is_on = false;
 }
 
 void read_log(YamlSection section, LogConfig& log) {
@@ -372,7 +382,10 @@ void read_metrics(YamlSection section, MetricsConfig& metrics) {
 }
 
 void read_server(YamlSection file, const fs::path& folder, ServerConfig& config) {
-  read_sensor_name(file, folder, config.mapper.sensor);
+  std::string sensor = told_by_scans;
+  file.text("sensor", sensor);
+  config.automatic_sensor.is_on = sensor == told_by_scans;
+  if (!config.automatic_sensor.is_on) read_sensor(sensor, file, folder, config.mapper.sensor);
   read_mapper(file, config.mapper);
   read_labels(file.section("labels"), config.labels);
   read_frames(file.section("frames"), config.frames);
@@ -432,7 +445,15 @@ ServerConfig load_server_config(const fs::path& file, ConfigReport& report) {
   yaml.require_no_faults();
   report = std::move(yaml.report);
   take_range_of_sensor(report, config.mapper);
+  config.automatic_sensor.sets_min_range = is_left_out(report, "prepare.min_range_m");
+  config.automatic_sensor.sets_max_range = is_left_out(report, "prepare.max_range_m");
   return config;
+}
+
+void use_sensor(const SensorModel& sensor, const AutomaticSensor& automatic, MapperConfig& mapper) {
+  mapper.sensor = sensor;
+  if (automatic.sets_min_range) mapper.prepare.min_range_m = sensor.min_range_m;
+  if (automatic.sets_max_range) mapper.prepare.max_range_m = sensor.max_range_m;
 }
 
 }  // namespace stillmap

@@ -221,9 +221,19 @@ struct MetricsConfig {
 /// not exist (with those that do), or two of one name.
 [[nodiscard]] std::vector<RobotProfile> load_robots(const TraversabilityConfig& config);
 
-/// Everything that stillmap-server can be told. Works as it is, with a 64-beam sensor and no file.
+/// A lidar that the configuration does not name is told by its scans.
+struct AutomaticSensor {
+  bool is_on = true;
+  /// Whether `prepare` leaves it to the lidar which points are too near or too far.
+  bool sets_min_range = true;
+  bool sets_max_range = true;
+};
+
+/// Everything that stillmap-server can be told. Works as it is, with any one lidar and no file.
 struct ServerConfig {
+  /// Until its scans have told the lidar, where that is not named, it is taken for a HDL-64E.
   MapperConfig mapper{.sensor = hdl_64e(), .prepare = {}, .odometry = {}, .static_map = {}};
+  AutomaticSensor automatic_sensor;
   LabelsConfig labels;
   FramesConfig frames;
   MountConfig mount;
@@ -241,6 +251,9 @@ struct ServerConfig {
   LogConfig log;
   MetricsConfig metrics;
 };
+
+/// Has the mapper work for a lidar that its scans have told.
+void use_sensor(const SensorModel& sensor, const AutomaticSensor& automatic, MapperConfig& mapper);
 
 /// Reads a server file (config/server/default.yaml shows every field). What the file leaves out
 /// keeps its default; relative paths start at the file's folder. Throws ConfigError with every

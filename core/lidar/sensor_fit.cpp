@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <iomanip>
 #include <numbers>
+#include <sstream>
 #include <utility>
 #include <vector>
 
@@ -74,14 +76,24 @@ bool complete(std::vector<double>& elevations) {
   return true;
 }
 
-/// Whether the elevations of a scan, from the highest, are the built-in sensor's beams.
-bool is_built_in(const std::vector<double>& elevations, const SensorModel& sensor) {
-  if (elevations.size() != static_cast<std::size_t>(sensor.rings)) return false;
+/// Whether the elevations of a scan, from the highest, are those of the built-in sensor's beams
+/// from this one on.
+bool are_beams_from(int first, const std::vector<double>& elevations, const SensorModel& sensor) {
   double sum = 0.0;
   for (std::size_t i = 0; i < elevations.size(); ++i) {
-    sum += std::abs(elevations[i] - sensor.beam_elevation(static_cast<int>(i)));
+    sum += std::abs(elevations[i] - sensor.beam_elevation(first + static_cast<int>(i)));
   }
   return sum / static_cast<double>(elevations.size()) <= max_elevation_difference;
+}
+
+/// Whether they are its beams, but for up to a quarter at the edges.
+bool is_built_in(const std::vector<double>& elevations, const SensorModel& sensor) {
+  const int missing = sensor.rings - static_cast<int>(elevations.size());
+  if (missing < 0 || 4 * missing > sensor.rings) return false;
+  for (int first = 0; first <= missing; ++first) {
+    if (are_beams_from(first, elevations, sensor)) return true;
+  }
+  return false;
 }
 
 std::optional<SensorModel> built_in(const std::vector<double>& elevations) {
@@ -149,7 +161,7 @@ std::optional<SensorModel> fit_bands(const Scan& scan) {
   if (high < 5.0 * degree && low < -20.0 * degree && low > -27.0 * degree) return hdl_64e();
   if (high - low < 1.0 * degree) return std::nullopt;
   SensorModel sensor;
-  sensor.name = "bands of a scan without rings";
+  sensor.name = "lidar without rings";
   sensor.pattern = ScanPattern::irregular;
   sensor.rings = bands;
   sensor.fov_up = high;
@@ -190,6 +202,37 @@ std::string sensor_mismatch(const Scan& scan, const SensorModel& sensor) {
   return "the cloud's points lie between " + in_degrees(low) + " and " + in_degrees(high) +
          " degrees of elevation, but sensor " + sensor.name + " sees from " +
          in_degrees(sensor.fov_down) + " to " + in_degrees(sensor.fov_up);
+}
+
+std::string in_words(const SensorModel& sensor) {
+  std::ostringstream text;
+  text << sensor.name << ": "
+       << (sensor.pattern == ScanPattern::irregular ? "points anywhere"
+                                                    : std::to_string(sensor.rings) + " rings")
+       << std::fixed << std::setprecision(2) << " from " << sensor.fov_up / degree << " to "
+       << sensor.fov_down / degree << " degrees of elevation";
+  return text.str();
+}
+
+bool SensorRecognition::learn(const Scan& scan) {
+  // Two lidars on one topic tell it again and again.
+  constexpr int max_times_told = 5;
+  if (sensor_ && (times_told_ == max_times_told || sensor_mismatch(scan, *sensor_).empty()))
+    return false;
+  std::optional<SensorModel> told = fit_sensor(scan);
+  if (!told) return false;
+  if (sensor_) {
+    const bool has_bands = told->pattern == ScanPattern::irregular;
+    if (told->pattern != sensor_->pattern || (!has_bands && told->rings <= sensor_->rings))
+      return false;
+    if (has_bands) {
+      told->fov_up = std::max(told->fov_up, sensor_->fov_up);
+      told->fov_down = std::min(told->fov_down, sensor_->fov_down);
+    }
+  }
+  sensor_ = std::make_shared<const SensorModel>(*std::move(told));
+  ++times_told_;
+  return true;
 }
 
 }  // namespace stillmap

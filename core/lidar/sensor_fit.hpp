@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -10,14 +11,32 @@ namespace stillmap {
 
 /// The sensor model that fits a scan: by the elevations of its rings where it has a
 /// ring field, else by the share of the field of view that it fills. A built-in sensor (VLP-16,
-/// HDL-32E, HDL-64E) where one fits within half a degree; else one made of the scan's own rings, or
-/// without a ring field of 40 bands between its lowest and highest points, which takes lidars that
-/// have no rings at all (Livox) as well as those that do not number them. Nothing when the
-/// scan has too few points.
+/// HDL-32E, HDL-64E) where one fits within half a degree, though a quarter of its rings saw
+/// nothing, as those that look into the sky; else one made of the scan's own rings, or without a
+/// ring field of 40 bands between its lowest and highest points, which takes lidars that have no
+/// rings at all (Livox) as well as those that do not number them. Nothing when the scan has too few
+/// points.
 [[nodiscard]] std::optional<SensorModel> fit_sensor(const Scan& scan);
 
 /// Why a scan cannot come from this sensor, in words: rings beyond the sensor's, or most points
 /// outside its field of view. Empty when it can.
 [[nodiscard]] std::string sensor_mismatch(const Scan& scan, const SensorModel& sensor);
+
+/// "VLP-16: 16 rings from 15.00 to -15.00 degrees of elevation".
+[[nodiscard]] std::string in_words(const SensorModel& sensor);
+
+/// Finds out from scans, one after another, which lidar they come from.
+class SensorRecognition {
+ public:
+  /// Takes a scan. True where it tells the lidar: the first one of enough points (fit_sensor) does,
+  /// and a later one that shows more rings, or without rings a wider field of view.
+  [[nodiscard]] bool learn(const Scan& scan);
+  /// Null until it is told.
+  [[nodiscard]] const std::shared_ptr<const SensorModel>& sensor() const { return sensor_; }
+
+ private:
+  std::shared_ptr<const SensorModel> sensor_;
+  int times_told_ = 0;
+};
 
 }  // namespace stillmap

@@ -81,9 +81,9 @@ MapperConfig mapper_config_beside_finder(const ServerConfig& config) {
 
 PlaceFinder::PlaceFinder(const ServerConfig& config, const LatestMap& latest_map, TileReader& tiles,
                          Statistics& statistics)
-    : mapper_config_(mapper_config_beside_finder(config)),
-      statistics_(statistics),
+    : statistics_(statistics),
       map_(latest_map, tiles),
+      mapper_config_(mapper_config_beside_finder(config)),
       scans_(max_waiting_scans) {
   worker_.emplace(
       "place_finder", scans_, [this](const LostScan& lost) { handle(lost); },
@@ -95,6 +95,14 @@ PlaceFinder::PlaceFinder(const ServerConfig& config, const LatestMap& latest_map
                 map_.release_unused();
               },
           .idle_period = std::chrono::seconds(1)});
+}
+
+void PlaceFinder::use_sensor(const SensorModel& sensor) {
+  {
+    const std::scoped_lock lock(mutex_);
+    mapper_config_.sensor = sensor;
+  }
+  map_corrected();
 }
 
 std::optional<Eigen::Isometry3d> PlaceFinder::relocate(Mapper& mapper, std::int64_t stamp_ns) {
@@ -218,6 +226,7 @@ LocalizationAnswer PlaceFinder::localize(const LocalizationQuestion& question) {
 void PlaceFinder::handle(const LostScan& lost) {
   if (lost.search != search_) return;
   if (localized_search_ != lost.search || !localization_) {
+    const std::scoped_lock lock(mutex_);
     localization_.emplace(mapper_config_.odometry, mapper_config_.sensor);
     localized_search_ = lost.search;
   }

@@ -79,6 +79,9 @@ class PlaceFinder {
   /// where it was. What was asked for is looked for again.
   void map_corrected();
 
+  /// Of the mapping thread: the lidar is another than it was taken for; as map_corrected().
+  void use_sensor(const SensorModel& sensor);
+
   /// The robot is looked for round this pose from the next scan on, and set there when it is found;
   /// otherwise the log says why not.
   void look_near(const PlaceGuess& guess);
@@ -118,13 +121,13 @@ class PlaceFinder {
   void take_place(const LostScan& lost);
   void give_up_guess(std::uint64_t search, const std::string& why);
 
-  MapperConfig mapper_config_;
   Statistics& statistics_;
   SearchableMap map_;
   /// Of the mapping thread.
   std::optional<std::int64_t> lost_since_ns_;
 
   mutable std::mutex mutex_;
+  MapperConfig mapper_config_;
   /// The search that goes on; 0: none. Written with the mutex locked.
   std::atomic<std::uint64_t> search_ = 0;
   std::uint64_t searches_ = 0;

@@ -10,9 +10,7 @@ namespace {
 std::map<std::string, std::string> file_metadata(const ServerConfig& config,
                                                  const std::string& label_source) {
   std::map<std::string, std::string> metadata{
-      {"software", std::string("stillmap ") + STILLMAP_VERSION},
-      {"sensor", config.mapper.sensor.name},
-      {"label_source", label_source}};
+      {"software", std::string("stillmap ") + STILLMAP_VERSION}, {"label_source", label_source}};
   if (!config.map.datum.empty()) metadata["datum"] = config.map.datum;
   return metadata;
 }

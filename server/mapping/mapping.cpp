@@ -39,7 +39,7 @@ std::vector<LabelledPoint> points_seen_until(const MapSnapshot& view, TileReader
 }  // namespace
 
 Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter,
-                 const MappingContext& context)
+                 OpenSegmenter open_segmenter, const MappingContext& context)
     : label_source_(segmenter->name()),
       storage_(context.storage),
       scans_(config.input.queue_length),
@@ -84,7 +84,9 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
       .loops = loops_ ? &*loops_ : nullptr,
       .earth = earth_ ? &*earth_ : nullptr,
       .submaps = submaps_ ? &*submaps_ : nullptr,
-      .throttle = &context.throttle};
+      .throttle = &context.throttle,
+      .open_segmenter = std::move(open_segmenter)};
+  if (!config.automatic_sensor.is_on) context.statistics.set_sensor(config.mapper.sensor.name);
   thread_.emplace(config, std::move(segmenter), storage_.take_loaded(),
                   storage_.saver().tile_store(), scans_, context.statistics, storage_.latest_map(),
                   outputs);

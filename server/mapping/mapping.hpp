@@ -41,7 +41,7 @@ class Mapping {
   /// Resumes what the storage has loaded, and starts. Throws DdsError, or std::invalid_argument for
   /// a mapper configuration with faults.
   Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter,
-          const MappingContext& context);
+          OpenSegmenter open_segmenter, const MappingContext& context);
 
   /// No more checkpoints, mapping ends after the scan in work, and the map is saved. Throws
   /// MapFileError. Without this call the destructor ends mapping, but saves nothing.

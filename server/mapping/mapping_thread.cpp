@@ -11,7 +11,6 @@
 #include "core/frames/rigid_motion.hpp"
 #include "core/map/map_id.hpp"
 #include "core/map/tile_evidence.hpp"
-#include "server/mapping/async_segmenter.hpp"
 #include "server/mapping/milliseconds.hpp"
 
 namespace stillmap::server {
@@ -21,15 +20,6 @@ using Clock = std::chrono::steady_clock;
 
 // How long a request, or the snapshot after the last scan, may wait while no scan comes.
 constexpr std::chrono::milliseconds idle_period{50};
-
-// Of the mapper's own poses; stamps that are set back are looked for among them.
-constexpr std::size_t mapper_poses = 1000;
-
-// Tiles that a request looks at before it lets a waiting scan pass; some milliseconds.
-constexpr std::size_t tiles_at_once = 8;
-
-// Tiles of one request that may have to be read from the disk.
-constexpr std::size_t max_stored_tiles = 4000;
 
 // Fewer than make a mapper believe a clock (ScanClock), more than a new sender repeats.
 constexpr int steps_of_set_clock = 5;
@@ -51,31 +41,24 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
                              const MappingOutputs& outputs)
     : map_limit_bytes_(map_share_bytes(config.map)),
       mapper_config_(config.mapper),
+      factory_(
+          config,
+          outputs.place_finder != nullptr ? mapper_config_beside_finder(config) : config.mapper,
+          outputs.open_segmenter, queue, statistics),
+      is_live_(config.input.delivery == DeliveryMode::latest),
       sensor_period_s_(config.mapper.sensor.period_s),
       publish_period_(config.publish.tiles_period_s),
       queue_(queue),
       statistics_(statistics),
       latest_map_(latest_map),
       outputs_(outputs),
-      mapper_(
-          outputs.place_finder != nullptr ? mapper_config_beside_finder(config) : config.mapper,
-          std::make_unique<AsyncSegmenter>(std::move(segmenter), segmentation_budget(config), queue,
-                                           statistics),
-          {.stage_ended = [this](std::string_view stage) { stage_ended(stage); },
-           .pose_found = [this](std::int64_t stamp_ns,
-                                const OdometryResult& odometry) { pose_found(stamp_ns, odometry); },
-           .scan_prepared =
-               [this](const Scan& scan, const PointLabels& labels) {
-                 outputs_.place_finder->add(scan, labels, frames_.T_base_lidar(), mapper_);
-               }}),
+      mapper_(factory_.make(std::move(segmenter), listeners())),
       corrector_(mapper_, map_limit_bytes_),
       imu_report_(statistics),
       frames_(config, outputs.static_transforms, statistics),
       prior_(outputs.prior, frames_, config.frames.odom, statistics),
       map_frame_(config.frames.map),
       odom_frame_(config.frames.odom) {
-  // The whole path is the latest map's.
-  mapper_.limit_trajectory(mapper_poses);
   const bool is_odom_own = config.frames.odom_source == FramesConfig::OdomSource::own;
   if (!odom_frame_.empty() && is_odom_own) odom_.emplace();
   if (stored && !stored->view.tiles.empty()) {
@@ -98,6 +81,37 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
                     .idle_period = idle_period,
                     // Then only checkpoints are wanted.
                     .on_failure = [this] { requests_.close([this] { end_correction(); }); }});
+}
+
+MapperListeners MappingThread::listeners() {
+  return {.stage_ended = [this](std::string_view stage) { stage_ended(stage); },
+          .pose_found = [this](std::int64_t stamp_ns,
+                               const OdometryResult& odometry) { pose_found(stamp_ns, odometry); },
+          .scan_prepared =
+              [this](const Scan& scan, const PointLabels& labels) {
+                outputs_.place_finder->add(scan, labels, frames_.T_base_lidar(), mapper_);
+              }};
+}
+
+bool MappingThread::use_sensor(const std::shared_ptr<const SensorModel>& sensor) {
+  if (!sensor || sensor == sensor_ || !factory_.knows_other_lidars()) return false;
+  const bool is_configured = !sensor_ && sensor->name == mapper_config_.sensor.name;
+  sensor_ = sensor;
+  statistics_.set_sensor(sensor->name);
+  factory_.tell_of_better_model(*sensor);
+  if (is_configured) return false;
+  end_correction();
+  const bool has_mapped = !mapper_.trajectory().empty();
+  ResumedMap map = mapper_.resume(ResumedMap::of(StaticMap(mapper_config_.static_map)));
+  // What this lidar saw when it was taken for another one is all that it can be registered to.
+  if (has_mapped) map = ResumedMap::of(std::move(map.map));
+  mapper_ = factory_.make_for(*sensor, listeners());
+  mapper_.keep_confirmed_scans(true);
+  static_cast<void>(mapper_.resume(std::move(map)));
+  sensor_period_s_ = sensor->period_s;
+  if (outputs_.place_finder != nullptr) outputs_.place_finder->use_sensor(*sensor);
+  if (outputs_.loops != nullptr && has_mapped) set_elsewhere();
+  return true;
 }
 
 void MappingThread::reset(std::uint64_t map_id, const std::shared_ptr<TileStore>& tile_store) {
@@ -237,6 +251,8 @@ RunCheckpoint MappingThread::checkpoint(CheckpointScope scope) {
   RunCheckpoint checkpoint{to_saved_map(map), map.step};
   checkpoint.map.trajectory = std::move(path);
   if (!datum.empty()) checkpoint.map.metadata["datum"] = datum;
+  if (const std::string sensor = statistics_.sensor(); !sensor.empty())
+    checkpoint.map.metadata["sensor"] = sensor;
   return checkpoint;
 }
 
@@ -279,78 +295,6 @@ MemoryUse MappingThread::memory_use() {
   return use;
 }
 
-RemovedInBox MappingThread::removed(const Eigen::AlignedBox3d& box_map) {
-  const TilesOfBox tiles = tiles_of(box_map);
-  StaticMap::RemovedVoxels all;
-  for (std::span<const TileId> left(tiles.ids); !left.empty();) {
-    run_on_some(tiles.map_id, left, [&](std::span<const TileId> some) {
-      StaticMap::RemovedVoxels part = mapper_.static_map().removed(box_map, some);
-      all.voxels.insert(all.voxels.end(), part.voxels.begin(), part.voxels.end());
-      all.non_resident.insert(all.non_resident.end(), part.non_resident.begin(),
-                              part.non_resident.end());
-      return true;
-    });
-  }
-  return {std::move(all.voxels), std::move(all.non_resident), tiles.tile_store};
-}
-
-std::size_t MappingThread::restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
-                                           const std::function<void()>& make_room) {
-  const TilesOfBox tiles = tiles_of(box_map);
-  StaticMap::RestoredVoxels restored;
-  for (std::span<const TileId> left(tiles.ids); !left.empty();) {
-    bool is_full = false;
-    run_on_some(tiles.map_id, left, [&](std::span<const TileId> some) {
-      const auto part = mapper_.static_map().restore_removed(reason, box_map, some);
-      restored.count += part.count;
-      restored.unreadable.insert(restored.unreadable.end(), part.unreadable.begin(),
-                                 part.unreadable.end());
-      is_full = mapper_.static_map().memory_use().bytes > map_limit_bytes_;
-      return !is_full;
-    });
-    if (is_full) make_room();
-  }
-  if (!restored.unreadable.empty()) {
-    throw std::runtime_error(restored.unreadable_text());
-  }
-  return restored.count;
-}
-
-MappingThread::TilesOfBox MappingThread::tiles_of(const Eigen::AlignedBox3d& box_map) {
-  TilesOfBox tiles;
-  std::size_t non_resident = 0;
-  requests_.run([&] {
-    const StaticMap& map = mapper_.static_map();
-    const std::size_t resident = map.memory_use().resident_tiles;
-    tiles = {latest_map_.view()->map_id, map.tiles_in(box_map, max_stored_tiles + resident + 1),
-             tile_store_};
-    // At least so many.
-    non_resident = map.non_resident_among(tiles.ids);
-  });
-  if (non_resident > max_stored_tiles) {
-    throw std::invalid_argument("the region has " + std::to_string(non_resident) +
-                                " tiles or more that are on disk; at most " +
-                                std::to_string(max_stored_tiles) +
-                                " can be answered: ask for parts");
-  }
-  return tiles;
-}
-
-void MappingThread::run_on_some(std::uint64_t map_id, std::span<const TileId>& left,
-                                const std::function<bool(std::span<const TileId> some)>& action) {
-  requests_.run([&] {
-    if (latest_map_.view()->map_id != map_id) {
-      throw std::runtime_error("another map began meanwhile; ask again for that one");
-    }
-    bool goes_on = true;
-    while (!left.empty() && goes_on) {
-      const auto some = left.first(std::min(left.size(), tiles_at_once));
-      goes_on = action(some) && queue_.waiting() == 0;
-      left = left.subspan(some.size());
-    }
-  });
-}
-
 void MappingThread::end_round(bool is_idle) {
   if (!take_corrected(is_idle)) return;
   if (octree_is_behind_ && mapper_.confirmed_scans() == 0) {
@@ -372,6 +316,8 @@ void MappingThread::map(QueuedScan queued) {
   received_ = queued.received;
   statistics_.add_latency("queue", milliseconds(began - queued.received));
   const std::int64_t stamp_ns = queued.scan.stamp_ns;
+  if (use_sensor(queued.sensor) && is_live_ && queue_.waiting() > 0)
+    return drop({"sensor_told", "the network was made ready for the lidar that this scan told"});
   if (!locate_lidar(queued)) return drop({"unknown_frame", frames_.missing()});
   // A clock that is being set back: a correction, which tells times apart, is to meet none of after
   // that. Now no scan waits for it: none is mapped until the mapper believes the clock.

@@ -19,6 +19,7 @@
 #include "server/mapping/loop_corrector.hpp"
 #include "server/mapping/map_corrector.hpp"
 #include "server/mapping/map_saver.hpp"
+#include "server/mapping/mapper_factory.hpp"
 #include "server/mapping/odometry_prior.hpp"
 #include "server/mapping/robot_frames.hpp"
 #include "server/mapping/robot_prior.hpp"
@@ -48,6 +49,8 @@ struct MappingOutputs {
   EarthFrame* earth = nullptr;
   SubmapPublisher* submaps = nullptr;
   BackgroundThrottle* throttle = nullptr;
+  /// For a lidar that its scans tell.
+  OpenSegmenter open_segmenter{};
 };
 
 /// What is kept out of the planning view: what of it is in memory, and the tiles that must be read
@@ -122,6 +125,10 @@ class MappingThread : public CheckpointSource {
   };
 
   void map(QueuedScan queued);
+  [[nodiscard]] MapperListeners listeners();
+  /// Goes on for this lidar, with the map and where the last pose was. False where it does already,
+  /// or nothing is known of it.
+  bool use_sensor(const std::shared_ptr<const SensorModel>& sensor);
   /// Gives the mapper the IMU's samples up to the scan's last point.
   void feed_imu(const Scan& scan);
   /// Runs the requests, and publishes the map when that is due.
@@ -179,7 +186,11 @@ class MappingThread : public CheckpointSource {
   /// Limit of the memory that the static map takes.
   std::size_t map_limit_bytes_;
   MapperConfig mapper_config_;
+  MapperFactory factory_;
+  bool is_live_;
   bool is_map_frozen_ = false;
+  /// The lidar that its scans told.
+  std::shared_ptr<const SensorModel> sensor_;
   double sensor_period_s_;
   std::chrono::duration<double> publish_period_;
   ScanQueue& queue_;

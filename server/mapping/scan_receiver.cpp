@@ -148,13 +148,16 @@ void SweepInput::drop(const std::string& reason, std::size_t count, const std::s
 
 ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& config,
                            ScanQueue& queue, Statistics& statistics)
-    : ScanReceiver(participant, config, config.topics.points,
-                   {{.index = 0,
-                     .name = "",
-                     .frame = "",
-                     .sensor = config.mapper.sensor,
-                     .reader = wire::CloudReader(reading_of(config, config.mapper.sensor))}},
-                   nullptr, queue, statistics) {}
+    : ScanReceiver(
+          participant, config, config.topics.points,
+          {{.index = 0,
+            .name = "",
+            .frame = "",
+            .sensor = config.mapper.sensor,
+            .reader = wire::CloudReader(reading_of(config, config.mapper.sensor)),
+            .recognition = config.automatic_sensor.is_on ? std::make_optional<SensorRecognition>()
+                                                         : std::nullopt}},
+          nullptr, queue, statistics) {}
 
 ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& config,
                            const std::string& ros_topic, SweepInput& sweeps, ScanQueue& queue,
@@ -248,7 +251,9 @@ void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std:
   }
   report(*lidar, cloud_changes, *scan);
   if (sweeps_ != nullptr) return sweeps_->add(lidar->index, *std::move(scan), stop);
-  queue_scan({*std::move(scan), frame, received}, stop);
+  queue_scan({*std::move(scan), frame, received,
+              lidar->recognition ? lidar->recognition->sensor() : nullptr},
+             stop);
 }
 
 void ScanReceiver::queue_scan(QueuedScan queued, const std::stop_token& stop) {
@@ -269,7 +274,11 @@ void ScanReceiver::report(Lidar& lidar, const std::string& cloud_changes, const 
   const bool is_new = !cloud_changes.empty() && layouts_.add(lidar.name + cloud_changes);
   if (is_new) spdlog::info("clouds on {}: {}", topic_, cloud_changes);
   const bool due = lidar.scans_read++ % scans_between_checks == 0;
-  if (!due && !is_new) return;
+  const bool is_unknown = lidar.recognition && !lidar.recognition->sensor();
+  if (!due && !is_new && !is_unknown) return;
+  if (lidar.recognition) recognise(lidar, scan);
+  // A lidar that is not known yet is taken for no other one.
+  if (lidar.recognition && !lidar.recognition->sensor()) return;
   const std::string misfit = sensor_mismatch(scan, lidar.sensor);
   if (misfit.empty()) return;
   statistics_.count("sensor_mismatch");
@@ -277,6 +286,12 @@ void ScanReceiver::report(Lidar& lidar, const std::string& cloud_changes, const 
                       misfit +
                           ": set 'sensor' in the configuration ('stillmap dataset sensor' "
                           "makes a sensor file from a recording)");
+}
+
+void ScanReceiver::recognise(Lidar& lidar, const Scan& scan) {
+  if (!lidar.recognition->learn(scan)) return;
+  lidar.sensor = *lidar.recognition->sensor();
+  spdlog::info("the lidar, as its scans tell: {}", in_words(lidar.sensor));
 }
 
 void ScanReceiver::drop(const std::string& reason, std::size_t count, const std::string& detail) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "config/loaders/server_config.hpp"
+#include "core/lidar/sensor_fit.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/lidar/sweep_merger.hpp"
 #include "idl/conversions/cloud_to_scan.hpp"
@@ -91,6 +92,8 @@ class ScanReceiver {
     SensorModel sensor;
     wire::CloudReader reader;
     std::uint64_t scans_read = 0;
+    /// Where the configuration does not name the lidar.
+    std::optional<SensorRecognition> recognition{};
   };
 
   ScanReceiver(dds::Participant& participant, const ServerConfig& config,
@@ -104,6 +107,8 @@ class ScanReceiver {
   void accept(const sensor_msgs::msg::PointCloud2& cloud, const std::stop_token& stop);
   /// Logs changes of the cloud's layout, and now and then checks that scans fit the sensor model.
   void report(Lidar& lidar, const std::string& cloud_changes, const Scan& scan);
+  /// By the scan, where it tells the lidar.
+  static void recognise(Lidar& lidar, const Scan& scan);
   void queue_scan(QueuedScan queued, const std::stop_token& stop);
   void drop(const std::string& reason, std::size_t count, const std::string& detail);
 

@@ -119,6 +119,16 @@ void Statistics::map_save_failed(const std::string& why) {
   metrics_->checkpoints_failing.Increment();
 }
 
+void Statistics::set_sensor(const std::string& name) {
+  const std::scoped_lock lock(mutex_);
+  sensor_ = name;
+}
+
+std::string Statistics::sensor() const {
+  const std::scoped_lock lock(mutex_);
+  return sensor_;
+}
+
 void Statistics::set_place_search(const std::string& text) {
   const std::scoped_lock lock(mutex_);
   place_search_ = text;

@@ -56,6 +56,10 @@ class Statistics {
   /// `why` is told in the status until a save succeeds.
   void map_save_failed(const std::string& why);
 
+  /// The lidar that scans are taken to come from; empty until its scans have told it.
+  void set_sensor(const std::string& name);
+  [[nodiscard]] std::string sensor() const;
+
   /// How the search for a lidar that is lost goes, in words; empty: there is none.
   void set_place_search(const std::string& text);
 
@@ -110,6 +114,7 @@ class Statistics {
   dds::SegmentationStatus segmentation_;
   std::string last_segmentation_failure_;
   std::string last_save_failure_;
+  std::string sensor_;
   std::string place_search_;
 };
 

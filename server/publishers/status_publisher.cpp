@@ -126,7 +126,8 @@ dds::ServerStatus ServerReport::status() const {
   status.delivery = traits_.delivery;
   status.label_source = live_labels.empty() ? traits_.label_source : live_labels;
   status.host = host_;
-  status.sensor = traits_.sensor;
+  status.sensor = statistics_.sensor();
+  if (status.sensor.empty()) status.sensor = "not known yet";
   status.points_topic = traits_.points_topic;
   status.health = latest_map_.health();
   status.map_version = view->version;

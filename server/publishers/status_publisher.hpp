@@ -47,7 +47,6 @@ class DiscoveryDiagnostics {
 struct ServerTraits {
   DeliveryMode delivery = DeliveryMode::latest;
   std::string label_source;
-  std::string sensor;
   std::string points_topic;
   std::vector<dds::Diagnostic> host_diagnostics;
 };

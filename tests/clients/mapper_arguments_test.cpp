@@ -27,6 +27,14 @@ TEST(MapperArguments, ASuggestedSensorCountsAsItsFileDoes) {
   }
 }
 
+TEST(MapperArguments, AServerFileLeavesTheSensorToTheRecordingUnlessItNamesIt) {
+  MapperArguments arguments;
+  arguments.config_file = test::write_file("any.yaml", "sensor: auto\n").string();
+  EXPECT_EQ(mapper_config(arguments, far_sighted()).sensor.max_range_m, 77.0);
+  arguments.config_file = test::write_file("named.yaml", "sensor: hdl_64e\n").string();
+  EXPECT_EQ(mapper_config(arguments, far_sighted()).sensor.rings, 64);
+}
+
 TEST(MapperArguments, RangesOfAServerFileCountMore) {
   MapperArguments arguments;
   arguments.config_file =

@@ -182,6 +182,32 @@ TEST(ServerConfig, RefusesWhatDdsCannotUse) {
               HasSubstr("dds.participant_name: is empty"));
 }
 
+TEST(ServerConfig, LeavesTheLidarToItsScansWhereItIsNotNamed) {
+  EXPECT_TRUE(load("labels: {source: none}\n").automatic_sensor.is_on);
+  EXPECT_TRUE(load("sensor: auto\n").automatic_sensor.is_on);
+  EXPECT_FALSE(load("sensor: hdl_64e\n").automatic_sensor.is_on);
+  EXPECT_THAT(refusal_of("frames: {base: base_link, lidar: lidar}\n"
+                         "sensors:\n"
+                         "  - {name: front, sensor: auto, topic: front}\n"
+                         "  - {name: rear, sensor: vlp_16, topic: rear}\n"),
+              HasSubstr("'auto' is for one lidar"));
+}
+
+TEST(ServerConfig, TakesRangesOfALidarThatWasToldUnlessTheFileSaysThem) {
+  SensorModel told = vlp_16();
+  told.min_range_m = 1.5;
+  told.max_range_m = 77.0;
+  ServerConfig any = load("sensor: auto\n");
+  use_sensor(told, any.automatic_sensor, any.mapper);
+  EXPECT_EQ(any.mapper.sensor.rings, 16);
+  EXPECT_EQ(any.mapper.prepare.min_range_m, 1.5);
+  EXPECT_EQ(any.mapper.prepare.max_range_m, 77.0);
+  ServerConfig near = load("prepare: {max_range_m: 30}\n");
+  use_sensor(told, near.automatic_sensor, near.mapper);
+  EXPECT_EQ(near.mapper.prepare.min_range_m, 1.5);
+  EXPECT_EQ(near.mapper.prepare.max_range_m, 30.0);
+}
+
 TEST(ServerConfig, SuggestsTheNameThatWasMeant) {
   EXPECT_THAT(refusal_of("publish: {path_period: 2}"), HasSubstr("did you mean 'path_period_s'"));
   EXPECT_THAT(refusal_of("odometri: {alpha: 0.1}"), HasSubstr("did you mean 'odometry'"));

@@ -94,6 +94,73 @@ TEST(FitSensor, MakesNothingOfNothing) {
   EXPECT_FALSE(fit_sensor(scan));
 }
 
+/// Without the highest rings, as where they look into the sky.
+Scan lower_rings_of(const SensorModel& sensor, int missing) {
+  Scan scan = scan_of(sensor, true);
+  const auto cut = 200 * static_cast<std::ptrdiff_t>(missing);
+  scan.points_lidar.erase(scan.points_lidar.begin(), scan.points_lidar.begin() + cut);
+  scan.ring.erase(scan.ring.begin(), scan.ring.begin() + cut);
+  return scan;
+}
+
+TEST(FitSensor, KnowsABuiltInSensorOfWhichSomeRingsSawNothing) {
+  EXPECT_EQ(fit_sensor(lower_rings_of(vlp_16(), 4))->name, "VLP-16");
+  EXPECT_EQ(fit_sensor(lower_rings_of(hdl_64e(), 10))->name, "HDL-64E");
+  EXPECT_EQ(fit_sensor(lower_rings_of(vlp_16(), 5))->rings, 11);
+  // Rings 4/3 degrees apart are those of a HDL-32E, but half of them are missing.
+  SensorModel high_resolution;
+  high_resolution.rings = 16;
+  high_resolution.fov_up = 32.0 / 3.0 * degree;
+  high_resolution.fov_down = -32.0 / 3.0 * degree;
+  EXPECT_THAT(fit_sensor(scan_of(high_resolution, true))->name, HasSubstr("16 rings"));
+}
+
+TEST(SensorRecognition, TakesTheFirstScanOfEnoughPoints) {
+  SensorRecognition recognition;
+  Scan few = scan_of(vlp_16(), true);
+  few.points_lidar.resize(900);
+  few.ring.resize(900);
+  EXPECT_FALSE(recognition.learn({}));
+  EXPECT_FALSE(recognition.learn(few));
+  EXPECT_EQ(recognition.sensor(), nullptr);
+  EXPECT_TRUE(recognition.learn(scan_of(vlp_16(), true)));
+  EXPECT_EQ(recognition.sensor()->name, "VLP-16");
+  EXPECT_FALSE(recognition.learn(scan_of(vlp_16(), true)));
+  EXPECT_EQ(in_words(*recognition.sensor()),
+            "VLP-16: 16 rings from 16.00 to -16.00 degrees of elevation");
+}
+
+TEST(SensorRecognition, LearnsOfMoreRingsAndAWiderFieldOfView) {
+  SensorModel ouster;
+  ouster.rings = 64;
+  ouster.fov_up = 22.5 * degree;
+  ouster.fov_down = -22.5 * degree;
+  SensorRecognition of_rings;
+  EXPECT_TRUE(of_rings.learn(lower_rings_of(ouster, 20)));
+  EXPECT_EQ(of_rings.sensor()->rings, 44);
+  EXPECT_TRUE(of_rings.learn(scan_of(ouster, true)));
+  EXPECT_EQ(of_rings.sensor()->rings, 64);
+  // Another lidar's.
+  EXPECT_FALSE(of_rings.learn(scan_of(vlp_16(), true)));
+  EXPECT_EQ(of_rings.sensor()->rings, 64);
+
+  const auto points_between = [](double low, double high) {
+    std::mt19937 random(4);
+    std::uniform_real_distribution<double> elevation(low * degree, high * degree),
+        azimuth(-3.1, 3.1);
+    Scan scan;
+    for (int i = 0; i < 20'000; ++i) add_point(elevation(random), azimuth(random), 9.0, scan);
+    return scan;
+  };
+  SensorRecognition without_rings;
+  EXPECT_TRUE(without_rings.learn(points_between(-7.0, 20.0)));
+  EXPECT_TRUE(without_rings.learn(points_between(0.0, 52.0)));
+  EXPECT_NEAR(without_rings.sensor()->fov_up, 52.0 * degree, 0.2 * degree);
+  EXPECT_NEAR(without_rings.sensor()->fov_down, -7.0 * degree, 0.2 * degree);
+  EXPECT_EQ(in_words(*without_rings.sensor()).find("lidar without rings: points anywhere from 5"),
+            0U);
+}
+
 TEST(SensorMismatch, NamesWhatDoesNotFit) {
   SensorModel wide;
   wide.rings = 128;

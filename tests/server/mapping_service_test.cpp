@@ -1,8 +1,10 @@
 #include <gmock/gmock.h>
+#include <signal.h>
 
 #include <map>
 #include <mutex>
 
+#include "core/map/storage/map_file.hpp"
 #include "tests/server/room_scans.hpp"
 #include "tests/server/server_process.hpp"
 
@@ -42,6 +44,24 @@ TEST_F(MappingService, SaysWhyNothingHappens) {
   EXPECT_EQ(status.label_source, "stream, else street");
   EXPECT_EQ(status.voxel_count, 0U);
   EXPECT_FALSE(status.software_version.empty());
+}
+
+TEST(MappingServiceOfAnyLidar, TellsWhichOneItsScansCameFrom) {
+  const ServiceSetup setup("every", "save_period_s: 3600", "");
+  ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  EXPECT_EQ(client.status().sensor, "not known yet");
+  ScanPublisher publisher(setup.publisher(true));
+  drive(publisher, 0, 6);
+  ASSERT_TRUE(wait_for_scans(client, 6));
+  EXPECT_EQ(client.status().sensor, "16 rings as seen in the data");
+  EXPECT_EQ(client.status().dropped(), 0U);
+  server.send(SIGTERM);
+  ASSERT_EQ(server.wait_for_exit(patience), 0);
+  const SavedMap stored = open_map_file(setup.map_file())->load();
+  EXPECT_EQ(stored.metadata.at("sensor"), "16 rings as seen in the data");
+  EXPECT_EQ(stored.trajectory.size(), 6U);
 }
 
 TEST_F(MappingService, GivesAPoseForEveryScan) {

@@ -60,8 +60,8 @@ class SlowSegmentation : public testing::Test {
   }
   [[nodiscard]] dds::ServerStatus status() const {
     return ServerReport(
-               {.label_source = "slow", .sensor = {}, .points_topic = {}, .host_diagnostics = {}},
-               latest_map_, statistics_, [] { return std::vector<dds::Diagnostic>(); },
+               {.label_source = "slow", .points_topic = {}, .host_diagnostics = {}}, latest_map_,
+               statistics_, [] { return std::vector<dds::Diagnostic>(); },
                [] { return std::string(); })
         .status();
   }

@@ -85,14 +85,13 @@ Weighting weighting_from_name(const std::string& weighting_name) {
 
 MapperConfig mapper_config(const MapperArguments& arguments, const SensorModel& suggested_sensor) {
   ServerConfig server;
-  ConfigReport report{.faults = {},
-                      .left_out = {"sensor", "prepare.min_range_m", "prepare.max_range_m"},
-                      .changed = {}};
+  ConfigReport report{
+      .faults = {}, .left_out = {"prepare.min_range_m", "prepare.max_range_m"}, .changed = {}};
   if (!arguments.config_file.empty()) server = load_server_config(arguments.config_file, report);
   MapperConfig& config = server.mapper;
   if (!arguments.sensor.empty()) {
     config.sensor = load_sensor(arguments.sensor);
-  } else if (is_left_out(report, "sensor") && server.lidars.empty()) {
+  } else if (server.automatic_sensor.is_on) {
     config.sensor = suggested_sensor;
   }
   take_range_of_sensor(report, config);

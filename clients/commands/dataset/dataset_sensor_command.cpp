@@ -11,6 +11,7 @@
 #include "clients/terminal/table.hpp"
 #include "config/loaders/sensor_file.hpp"
 #include "core/elevation_calibration.hpp"
+#include "core/lidar/sensor_fit.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -68,9 +69,7 @@ void calibrate(const ScanDataset& recording, int max_scans, SensorModel& sensor)
 ExitCode run(const DatasetSensorArguments& arguments) {
   const ScanDataset recording = open_recording(arguments.dataset, arguments.topic);
   SensorModel sensor = recording.suggested_sensor();
-  std::cout << sensor.name << ": " << sensor.rings << " rings from "
-            << fixed(sensor.fov_up / degree, 2) << " to " << fixed(sensor.fov_down / degree, 2)
-            << " degrees of elevation\n";
+  std::cout << in_words(sensor) << "\n";
   if (arguments.calibrates) calibrate(recording, arguments.scans, sensor);
   if (!arguments.out.empty()) {
     save_sensor(sensor, arguments.out);

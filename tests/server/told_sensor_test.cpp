@@ -1,0 +1,125 @@
+// The mapping thread with a lidar that its scans tell.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <mutex>
+#include <stdexcept>
+
+#include "core/segmentation/model_error.hpp"
+#include "server/mapping/mapping_thread.hpp"
+#include "server/publishers/status_publisher.hpp"
+#include "tests/eventually.hpp"
+#include "tests/server/room_scans.hpp"
+
+namespace stillmap::server {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Clock = std::chrono::steady_clock;
+
+class ToldSensor : public testing::Test {
+ protected:
+  ToldSensor() { config_.input.delivery = DeliveryMode::every; }
+
+  void start() {
+    MappingOutputs helpers;
+    helpers.open_segmenter = [this](const SensorModel& sensor) {
+      opened_.push_back(sensor.name);
+      if (fails_) throw ModelError("street", "has no images of so many rows");
+      return std::make_unique<PassthroughSegmenter>();
+    };
+    mapping_.emplace(config_, std::make_unique<PassthroughSegmenter>(), std::nullopt, nullptr,
+                     queue_, statistics_, latest_map_, helpers);
+  }
+  /// Sends so many scans and waits until they are worked off.
+  void drive(int scans, const std::shared_ptr<const SensorModel>& sensor) {
+    for (int k = 0; k < scans; ++k)
+      queue_.push_dropping_oldest({test::room_scan(next_++), "lidar", Clock::now(), sensor});
+    ASSERT_TRUE(test::eventually([this] {
+      const dds::ServerStatus now = status();
+      return now.counter("scans_mapped") + now.dropped() >= static_cast<std::uint64_t>(next_);
+    }));
+    mapping_->publish_now();
+  }
+  [[nodiscard]] dds::ServerStatus status() const { return report_.status(); }
+  /// How far the last pose is from the true one.
+  [[nodiscard]] double error_m() const {
+    const Eigen::Isometry3d T_true =
+        test::room_pose(0).T_map_lidar.inverse() * test::room_pose(next_ - 1).T_map_lidar;
+    return (latest_map_.newest_pose().T_map_lidar.translation() - T_true.translation()).norm();
+  }
+
+  ServerConfig config_;
+  std::vector<std::string> opened_;
+  bool fails_ = false;
+  std::shared_ptr<const SensorModel> told_ = std::make_shared<const SensorModel>(vlp_16());
+  ScanQueue queue_{30};
+  Statistics statistics_;
+  LatestMap latest_map_;
+  ServerReport report_{{.label_source = "stream", .points_topic = {}, .host_diagnostics = {}},
+                       latest_map_,
+                       statistics_,
+                       [] { return std::vector<dds::Diagnostic>{}; },
+                       [] { return std::string(); }};
+  std::optional<MappingThread> mapping_;
+  int next_ = 0;
+};
+
+TEST_F(ToldSensor, HasLabelsOpenedForItOnce) {
+  start();
+  EXPECT_EQ(status().sensor, "not known yet");
+  drive(6, told_);
+  EXPECT_EQ(status().sensor, "VLP-16");
+  EXPECT_THAT(opened_, ElementsAre("VLP-16"));
+  EXPECT_EQ(status().counter("scans_mapped"), 6U);
+  EXPECT_LT(error_m(), 0.1);
+  EXPECT_EQ(mapping_->checkpoint(CheckpointScope::everything).map.metadata.at("sensor"), "VLP-16");
+}
+
+TEST_F(ToldSensor, AsConfiguredChangesNothing) {
+  config_.mapper.sensor = vlp_16();
+  start();
+  drive(4, told_);
+  EXPECT_THAT(opened_, IsEmpty());
+  EXPECT_EQ(status().sensor, "VLP-16");
+}
+
+TEST_F(ToldSensor, LateGoesOnInTheMapWhereItIs) {
+  start();
+  drive(12, nullptr);
+  const auto before = latest_map_.view();
+  ASSERT_FALSE(before->tiles.empty());
+  drive(12, told_);
+  const auto after = latest_map_.view();
+  EXPECT_EQ(after->map_id, before->map_id);
+  EXPECT_GE(after->tiles.voxel_count(), before->tiles.voxel_count());
+  EXPECT_LT(error_m(), 0.1);
+  EXPECT_EQ(latest_map_.trajectory().size(), 24U);
+  EXPECT_EQ(status().health, OdometryHealth::good);
+}
+
+TEST_F(ToldSensor, WithoutLabelsForItIsMappedWithoutAndSaysWhy) {
+  fails_ = true;
+  start();
+  drive(6, told_);
+  EXPECT_EQ(status().counter("scans_mapped"), 6U);
+  EXPECT_EQ(status().counter("label_failures"), 6U);
+  EXPECT_THAT(status().reason, HasSubstr("VLP-16"));
+  EXPECT_THAT(status().reason, HasSubstr("no images of so many rows"));
+  EXPECT_LT(error_m(), 0.1);
+}
+
+TEST_F(ToldSensor, LiveDoesNotBeginBeforeScansThatWaitedForItsNetwork) {
+  config_.input.delivery = DeliveryMode::latest;
+  for (int k = 0; k < 3; ++k)
+    queue_.push_dropping_oldest({test::room_scan(next_++), "lidar", Clock::now(), told_});
+  start();
+  drive(1, told_);
+  EXPECT_EQ(status().counter("scans_mapped"), 3U);
+  EXPECT_EQ(latest_map_.trajectory().front().stamp_ns, test::room_pose(1).stamp_ns);
+}
+
+}  // namespace
+}  // namespace stillmap::server
