@@ -137,18 +137,24 @@ std::vector<std::int64_t> stamps_from_names(const std::vector<fs::path>& files) 
   return stamps_ns;
 }
 
-double highest_elevation(const Scan& scan) {
-  double highest = 0.0;
+/// Lowest and highest elevation of the points [rad].
+std::pair<double, double> field_of_view(const Scan& scan) {
+  double low = 0.0, high = 0.0;
   for (const auto& p : scan.points_lidar) {
-    const double elevation = std::abs(std::atan2(p.z(), std::hypot(p.x(), p.y())));
-    if (std::isfinite(elevation)) highest = std::max(highest, elevation);
+    const double elevation = std::atan2(p.z(), std::hypot(p.x(), p.y()));
+    if (!std::isfinite(elevation)) continue;
+    low = std::min(low, elevation);
+    high = std::max(high, elevation);
   }
-  return highest;
+  return {low, high};
 }
 
 SensorModel guess_sensor(const Scan& scan, bool kitti_file) {
-  if (!kitti_file || !scan.ring.empty()) {
-    if (auto sensor = fit_sensor(scan)) return *std::move(sensor);
+  if (auto sensor = fit_sensor(scan)) {
+    // KITTI's own, of which somebody has cut away the ground, say.
+    const bool is_part_of_kitti = kitti_file && sensor->pattern == ScanPattern::irregular &&
+                                  sensor_mismatch(scan, hdl_64e()).empty();
+    return is_part_of_kitti ? hdl_64e() : *std::move(sensor);
   }
   if (!scan.ring.empty()) {
     const int rings = *std::ranges::max_element(scan.ring) + 1;
@@ -156,7 +162,8 @@ SensorModel guess_sensor(const Scan& scan, bool kitti_file) {
   }
   constexpr double just_above_vlp_16 = 16.0 * std::numbers::pi / 180.0;
   if (kitti_file || scan.empty()) return hdl_64e();
-  return highest_elevation(scan) < just_above_vlp_16 ? vlp_16() : hdl_64e();
+  const auto [low, high] = field_of_view(scan);
+  return std::max(-low, high) < just_above_vlp_16 ? vlp_16() : hdl_64e();
 }
 
 }  // namespace
@@ -218,7 +225,9 @@ void ScanDataset::learn_from_sample() {
   intensity_scale_ = 1.0F / full_scales[full_scales.size() - (full_scales.size() > 2 ? 2 : 1)];
   const auto known = source_ ? source_->sensor() : std::nullopt;
   suggested_sensor_ = known ? *known : guess_sensor(typical, files_.front().extension() == ".bin");
-  if (typical.time_offset_s.empty() && typical.ring.empty()) kitti_lidar_ = find_kitti_lidar();
+  const bool is_as_kittis = suggested_sensor_.name == hdl_64e().name;
+  if (is_as_kittis && typical.time_offset_s.empty() && typical.ring.empty())
+    kitti_lidar_ = find_kitti_lidar();
 }
 
 std::optional<KittiLidar> ScanDataset::find_kitti_lidar() const {

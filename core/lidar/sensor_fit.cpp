@@ -120,6 +120,13 @@ SensorModel of_beams(std::vector<double> elevations) {
   return sensor;
 }
 
+/// `elevations`: from the highest, of a ring each.
+std::optional<SensorModel> fit_beams(std::vector<double> elevations) {
+  if (auto sensor = built_in(elevations)) return sensor;
+  SensorModel sensor = of_beams(std::move(elevations));
+  return sensor.faults().empty() ? std::optional(std::move(sensor)) : std::nullopt;
+}
+
 std::optional<SensorModel> fit_rings(const Scan& scan) {
   std::vector<double> elevations = ring_elevations(scan);
   // A field of more rings than a sensor can have is something else.
@@ -127,9 +134,79 @@ std::optional<SensorModel> fit_rings(const Scan& scan) {
     return std::nullopt;
   }
   std::ranges::sort(elevations, std::greater<>{});
-  if (auto sensor = built_in(elevations)) return sensor;
-  SensorModel sensor = of_beams(std::move(elevations));
-  return sensor.faults().empty() ? std::optional(std::move(sensor)) : std::nullopt;
+  return fit_beams(std::move(elevations));
+}
+
+/// Points that lie close together in elevation.
+struct Cluster {
+  double points = 0.0;
+  double sum = 0.0;
+  double squares = 0.0;
+
+  [[nodiscard]] double mean() const { return sum / points; }
+  [[nodiscard]] double variance() const { return squares / points - mean() * mean(); }
+};
+
+/// Clusters of the elevations from the highest, where nothing lies between; `points`: of all.
+std::vector<Cluster> elevation_clusters(const Scan& scan, double& points) {
+  // Beams start a centimetre beside the origin, which is half a degree here; farther away a lidar
+  // low on a robot sees nothing of its lower rings.
+  constexpr float min_range_m = 1.0F;
+  constexpr double bin = 0.02 * degree;
+  constexpr std::size_t bins_half = 4500;
+  constexpr std::size_t empty_between = 2;
+  std::vector<Cluster> histogram(2 * bins_half + 1);
+  points = 0.0;
+  for (const Eigen::Vector3f& p : scan.points_lidar) {
+    const double elevation = elevation_of(p);
+    if (!std::isfinite(elevation) || p.squaredNorm() < min_range_m * min_range_m) continue;
+    Cluster& at = histogram[static_cast<std::size_t>(std::lround(elevation / bin) + bins_half)];
+    at.points += 1.0;
+    at.sum += elevation;
+    at.squares += elevation * elevation;
+    points += 1.0;
+  }
+  std::vector<Cluster> clusters;
+  std::size_t empty = empty_between;
+  for (auto at = histogram.rbegin(); at != histogram.rend(); ++at) {
+    if (at->points == 0.0) {
+      ++empty;
+      continue;
+    }
+    if (empty >= empty_between) clusters.emplace_back();
+    empty = 0;
+    clusters.back().points += at->points;
+    clusters.back().sum += at->sum;
+    clusters.back().squares += at->squares;
+  }
+  return clusters;
+}
+
+/// Elevations of the rings, from the highest, that a scan shows which does not number them: nearly
+/// all of its points lie close to them, and few between. Empty where it shows none.
+std::vector<double> shown_rings(const Scan& scan) {
+  constexpr std::size_t min_rings = 8;
+  constexpr double min_share_of_ring = 0.002;
+  constexpr double min_share_on_rings = 0.95;
+  constexpr double max_deviation_to_step = 0.12;
+  double points = 0.0;
+  std::vector<Cluster> clusters = elevation_clusters(scan, points);
+  std::erase_if(clusters, [&](const Cluster& c) { return c.points < min_share_of_ring * points; });
+  if (clusters.size() < min_rings || points < static_cast<double>(min_points)) return {};
+  double on_rings = 0.0;
+  std::vector<double> elevations;
+  for (std::size_t i = 0; i < clusters.size(); ++i) {
+    const Cluster& ring = clusters[i];
+    double step = std::numbers::pi;
+    if (i > 0) step = std::min(step, clusters[i - 1].mean() - ring.mean());
+    if (i + 1 < clusters.size()) step = std::min(step, ring.mean() - clusters[i + 1].mean());
+    const double max_deviation = max_deviation_to_step * step;
+    if (ring.variance() > max_deviation * max_deviation) return {};
+    on_rings += ring.points;
+    elevations.push_back(ring.mean());
+  }
+  if (on_rings < min_share_on_rings * points) return {};
+  return elevations;
 }
 
 /// Elevations from all over the scan, sorted.
@@ -181,6 +258,8 @@ std::optional<SensorModel> fit_sensor(const Scan& scan) {
   if (!scan.ring.empty()) {
     if (auto sensor = fit_rings(scan)) return sensor;
   }
+  if (std::vector<double> rings = shown_rings(scan); !rings.empty())
+    return fit_beams(std::move(rings));
   return fit_bands(scan);
 }
 

@@ -257,6 +257,35 @@ TEST(ScanDataset, APartialFirstScanAndADamagedOneDoNotDecideWhichSensorItWas) {
   EXPECT_THROW(ScanDataset(folder.path() / "sequence"), DatasetError);
 }
 
+TEST(ScanDataset, FilesAsKittisWithoutRingsAreOfTheLidarThatTheirPointsTell) {
+  const ScratchFolder folder;
+  const auto suggested = [&](Scan scan) {
+    write_kitti_bin(folder.path() / "000000.bin", scan);
+    return ScanDataset(folder.path()).suggested_sensor();
+  };
+  EXPECT_EQ(suggested(ringed_scan(hdl_32e(), 0, 0)).name, "HDL-32E");
+  EXPECT_EQ(suggested(ringed_scan(vlp_16(), 0, 0)).name, "VLP-16");
+  EXPECT_EQ(suggested(ringed_scan(hdl_64e(), 0, 0)).name, "HDL-64E");
+
+  // Points of KITTI, which show no rings to speak of; all, and without the ground.
+  Scan kitti, above_ground, livox;
+  for (int i = 0; i < 20'000; ++i) {
+    const double share = i / 20'000.0;
+    const auto point = [&](double low_deg, double high_deg) {
+      const double elevation = (low_deg + share * (high_deg - low_deg)) * std::numbers::pi / 180.0;
+      return Eigen::Vector3f(
+          (10.0 * Eigen::Vector3d(std::cos(elevation), 0.0, std::sin(elevation))).cast<float>());
+    };
+    kitti.points_lidar.push_back(point(-24.5, 2.5));
+    above_ground.points_lidar.push_back(point(-8.0, 2.5));
+    livox.points_lidar.push_back(point(-36.0, 35.0));
+  }
+  for (Scan* scan : {&kitti, &above_ground, &livox}) scan->intensity.assign(scan->size(), 0.5F);
+  EXPECT_EQ(suggested(kitti).name, "HDL-64E");
+  EXPECT_EQ(suggested(above_ground).name, "HDL-64E");
+  EXPECT_EQ(suggested(livox).pattern, ScanPattern::irregular);
+}
+
 TEST(ScanDataset, FaultsSayWhatToDo) {
   const ScratchFolder folder;
   const auto message = [](const std::filesystem::path& path) {

@@ -82,6 +82,52 @@ TEST(FitSensor, GivesALidarWithoutRingsBands) {
   EXPECT_NEAR(fitted->fov_down, -7.0 * degree, 0.2 * degree);
 }
 
+TEST(FitSensor, FindsRingsThatAScanDoesNotNumber) {
+  SensorModel uneven;
+  uneven.rings = 20;
+  uneven.fov_up = 15.0 * degree;
+  uneven.fov_down = -25.0 * degree;
+  for (int ring = 0; ring < 20; ++ring)
+    uneven.beam_elevations.push_back((14.0 - ring - 0.04 * ring * ring) * degree);
+  for (const SensorModel& sensor : {hdl_32e(), uneven}) {
+    Scan scan = scan_of(sensor, false);
+    // Beams that start beside the origin, and some points of mixed returns between.
+    for (std::size_t i = 0; i < scan.size(); ++i)
+      scan.points_lidar[i].z() += 0.005F * static_cast<float>(static_cast<int>(i / 200 % 3) - 1);
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> elevation(-24.0 * degree, 9.0 * degree);
+    const std::size_t mixed = scan.size() / 50;
+    for (std::size_t i = 0; i < mixed; ++i) add_point(elevation(random), 1.0, 9.0, scan);
+    const auto fitted = fit_sensor(scan);
+    ASSERT_TRUE(fitted);
+    EXPECT_THAT(fitted->faults(), IsEmpty());
+    EXPECT_EQ(fitted->pattern, ScanPattern::rings);
+    ASSERT_EQ(fitted->rings, sensor.rings);
+    for (int ring = 0; ring < sensor.rings; ++ring)
+      EXPECT_NEAR(fitted->beam_elevation(ring), sensor.beam_elevation(ring), 0.1 * degree) << ring;
+  }
+  EXPECT_EQ(fit_sensor(scan_of(hdl_32e(), false))->name, "HDL-32E");
+}
+
+TEST(FitSensor, TakesNoPatternWithoutRingsForRings) {
+  for (const int points : {1'200, 3'000, 10'000, 100'000}) {
+    std::mt19937 random(static_cast<unsigned>(points));
+    std::uniform_real_distribution<double> phase(0.0, 2.0 * std::numbers::pi);
+    Scan uniform, rosette, lines;
+    for (int i = 0; i < points; ++i) {
+      const double a = phase(random), b = phase(random);
+      add_point((a * 18.0 - 50.0) * degree, b, 9.0, uniform);
+      // Points of a rosette crowd at its edges.
+      add_point(35.0 * std::sin(a) * std::cos(b) * degree, 0.6 * std::sin(a) * std::sin(b), 9.0,
+                rosette);
+      // Eight lines that each sweep over a tenth of the field of view.
+      add_point((-20.0 + 5.0 * (i % 8) + 4.0 * std::sin(b)) * degree, b, 9.0, lines);
+    }
+    for (const Scan& scan : {uniform, rosette, lines})
+      EXPECT_EQ(fit_sensor(scan)->pattern, ScanPattern::irregular) << points;
+  }
+}
+
 TEST(FitSensor, MakesNothingOfNothing) {
   EXPECT_FALSE(fit_sensor({}));
   Scan scan;
