@@ -94,9 +94,10 @@ struct RegistrationConfig {
   /// Neighbours that are spread less than this across than along, 0..1, by their standard
   /// deviations squared, do not say how their plane is turned.
   double min_plane_width = 0.1;
-  /// The same, and the neighbours, of lidars whose rings are far apart (has_sparse_rings), where
-  /// they are registered by surfaces: the nearest five map points mostly lie on one ring, and a
-  /// plane that leans over takes the lidar along. Lines along their rings do not count at all.
+  /// The same, and the neighbours, of lidars whose rings are far apart (has_sparse_rings), and of
+  /// all while their local map is that of some first scans, where they are registered by surfaces:
+  /// the nearest five map points mostly lie on one ring, and a plane that leans over takes the
+  /// lidar along. Lines along their rings do not count at all.
   int sparse_ring_neighbours = 16;
   double sparse_ring_plane_width = 0.5;
   /// A plane counts s^2 / (s^2 + v), where v is the variance of its neighbours across it and s this
@@ -107,7 +108,7 @@ struct RegistrationConfig {
   double plane_deviation_m = 0.03;
   /// The same of lidars whose rings are far apart, with more and farther neighbours.
   double sparse_ring_plane_deviation_m = 0.05;
-  /// Of a lidar with rings: a plane tells little of a point that lies farther than this from the
+  /// A plane tells little of a point that lies farther than this from the
   /// middle of its neighbours, along the plane, in standard deviations of theirs (a Mahalanobis
   /// distance): the few rings of the scans before, which err together, turn the plane about
   /// themselves, and the next ring comes to lie beyond them. Not in the paper; 0 switches it off.

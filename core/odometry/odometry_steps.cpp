@@ -88,7 +88,7 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
 }
 
 void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& prediction) const {
-  parts.sparse_rings = is_by_surfaces && has_sparse_rings(sensor);
+  parts.sparse_rings = is_by_surfaces && (has_sparse_rings(sensor) || is_map_young());
   const auto find_features = [&] {
     if (!is_by_surfaces) {
       parts.features = extract_features(parts.scan, config.features);

@@ -44,6 +44,12 @@ struct Odometry::State {
   }
   /// Whether the last velocity predicts the pose of a scan of this time.
   [[nodiscard]] bool has_velocity(std::int64_t stamp_ns) const;
+  /// Whether the local map is that of some first scans: whatever the lidar, the nearest points of
+  /// most of theirs lie along one sweep of a beam. Not while a first scan that rolled is bent: wide
+  /// planes of it lead the second one astray.
+  [[nodiscard]] bool is_map_young() const {
+    return !fits.are_known() && !first_scan && !has_prior_map && !config.paper_exact;
+  }
   /// What scans are registered by now.
   [[nodiscard]] const OdometryConfig& method() const {
     return fits.are_known() ? config : first_config;

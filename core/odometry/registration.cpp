@@ -404,10 +404,6 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
                                  const OdometryConfig& config,
                                  const PoseTangent& sweep_correction) {
   RegistrationConfig limits = config.registration;
-  if (!features.in_rings) {
-    limits.across_rings_weight = 1.0;
-    limits.max_extrapolation = 0.0;
-  }
   if (features.sparse_rings) {
     limits.neighbours = limits.sparse_ring_neighbours;
     limits.min_plane_width = limits.sparse_ring_plane_width;

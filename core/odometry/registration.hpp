@@ -50,9 +50,8 @@ struct FeatureSets {
   /// The points were measured one after the other: their motion within the sweep is estimated too.
   bool rolling = false;
   SweepPrior sweep_prior;
-  /// By a lidar that turns about its z axis and sees rings.
-  bool in_rings = false;
-  /// They are so far apart that `RegistrationConfig::sparse_ring_neighbours` make a surface.
+  /// The local map's points lie along beams so far apart that
+  /// `RegistrationConfig::sparse_ring_neighbours` make a surface.
   bool sparse_rings = false;
 };
 

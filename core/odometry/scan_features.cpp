@@ -96,7 +96,6 @@ FeatureSets usable_features(const ScanInParts& parts, const OdometryConfig& conf
           .level_points = points.of(parts.features.level_points, all_points),
           .rolling = points.rolling(),
           .sweep_prior = parts.sweep_prior,
-          .in_rings = parts.sparse_rings || !parts.scan.ring.empty(),
           .sparse_rings = parts.sparse_rings};
 }
 
@@ -120,7 +119,6 @@ FeatureSets map_features(const ScanInParts& parts, const std::vector<Motion>& mo
   sets.planes = points.of(parts.features.planes, stands);
   sets.points = points.of(parts.features.points, all_points);
   sets.rolling = points.rolling();
-  sets.in_rings = parts.sparse_rings || !parts.scan.ring.empty();
   sets.sparse_rings = parts.sparse_rings;
   return sets;
 }

@@ -34,7 +34,8 @@ struct ScanInParts {
   std::optional<RangeImageView> view{};
   std::vector<MotionClass> motion_classes{};
   SweepPrior sweep_prior{};
-  /// Registered by surfaces, though few points of a ring have neighbours on the next one.
+  /// Registered by surfaces, though few points have neighbours on another ring: the rings are far
+  /// apart, or the local map is young.
   bool sparse_rings = false;
   MovableUse movable = MovableUse::none;
 };
