@@ -63,7 +63,7 @@ TEST_F(ServiceCommandTest, ReplayOverDdsGivesThePosesThatMapGives) {
   EXPECT_EQ(json.at("published"), 8);
   EXPECT_EQ(json.at("mapped"), 8);
   EXPECT_EQ(json.at("dropped"), 0);
-  ASSERT_EQ(run("map " + path("city") + " --sensor hdl_64e --out " + path("out")).exit_code, 0);
+  ASSERT_EQ(run("map " + path("city") + " --out " + path("out")).exit_code, 0);
   const ProcessResult same =
       run("evaluate trajectory --json --truth " + path("out/poses_lidar.txt") + " --estimate " +
           path("replayed.txt"));
