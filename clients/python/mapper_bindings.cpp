@@ -9,7 +9,6 @@
 #include "clients/python/bindings.hpp"
 #include "clients/python/map.hpp"
 #include "clients/python/scan.hpp"
-#include "config/loaders/mapper_section.hpp"
 #include "config/loaders/model_file.hpp"
 #include "config/loaders/sensor_file.hpp"
 #include "config/loaders/server_config.hpp"
@@ -54,11 +53,8 @@ std::unique_ptr<SharedMapper> make_mapper(const SensorModel& sensor, const std::
                                           const std::optional<std::filesystem::path>& config_file) {
   const py::gil_scoped_release released;
   ServerConfig config;
-  ConfigReport report{
-      .faults = {}, .left_out = {"prepare.min_range_m", "prepare.max_range_m"}, .changed = {}};
-  if (config_file) config = load_server_config(*config_file, report);
-  config.mapper.sensor = sensor;
-  take_range_of_sensor(report, config.mapper);
+  if (config_file) config = load_server_config(*config_file);
+  use_sensor(sensor, config.automatic_sensor, config.mapper);
   auto mapper = std::make_unique<Mapper>(
       config.mapper, open_segmenter(labels_from(config.labels, labels), sensor));
   mapper->reset(new_map_id());

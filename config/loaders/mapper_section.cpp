@@ -132,11 +132,4 @@ void read_mapper(YamlSection& file, MapperConfig& mapper) {
   read_static_map(file.section("static_map"), mapper.static_map);
 }
 
-void take_range_of_sensor(const ConfigReport& report, MapperConfig& mapper) {
-  if (is_left_out(report, "prepare.min_range_m"))
-    mapper.prepare.min_range_m = mapper.sensor.min_range_m;
-  if (is_left_out(report, "prepare.max_range_m"))
-    mapper.prepare.max_range_m = mapper.sensor.max_range_m;
-}
-
 }  // namespace stillmap

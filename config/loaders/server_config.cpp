@@ -444,9 +444,9 @@ ServerConfig load_server_config(const fs::path& file, ConfigReport& report) {
   read_server(YamlSection(yaml), file.parent_path(), config);
   yaml.require_no_faults();
   report = std::move(yaml.report);
-  take_range_of_sensor(report, config.mapper);
   config.automatic_sensor.sets_min_range = is_left_out(report, "prepare.min_range_m");
   config.automatic_sensor.sets_max_range = is_left_out(report, "prepare.max_range_m");
+  use_sensor(SensorModel(config.mapper.sensor), config.automatic_sensor, config.mapper);
   return config;
 }
 

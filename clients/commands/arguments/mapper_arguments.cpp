@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "config/loaders/mapper_section.hpp"
 #include "config/loaders/model_file.hpp"
 #include "config/loaders/sensor_file.hpp"
 #include "config/loaders/server_config.hpp"
@@ -85,16 +84,13 @@ Weighting weighting_from_name(const std::string& weighting_name) {
 
 MapperConfig mapper_config(const MapperArguments& arguments, const SensorModel& suggested_sensor) {
   ServerConfig server;
-  ConfigReport report{
-      .faults = {}, .left_out = {"prepare.min_range_m", "prepare.max_range_m"}, .changed = {}};
-  if (!arguments.config_file.empty()) server = load_server_config(arguments.config_file, report);
+  if (!arguments.config_file.empty()) server = load_server_config(arguments.config_file);
   MapperConfig& config = server.mapper;
   if (!arguments.sensor.empty()) {
-    config.sensor = load_sensor(arguments.sensor);
+    use_sensor(load_sensor(arguments.sensor), server.automatic_sensor, config);
   } else if (server.automatic_sensor.is_on) {
-    config.sensor = suggested_sensor;
+    use_sensor(suggested_sensor, server.automatic_sensor, config);
   }
-  take_range_of_sensor(report, config);
   if (!arguments.weighting.empty()) {
     config.odometry.weighting = weighting_from_name(arguments.weighting);
   }
