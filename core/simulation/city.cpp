@@ -52,9 +52,9 @@ std::vector<Frontage> frontages(const Interval& u, const Interval& v) {
   return out;
 }
 
-// Shapes in gardens. Hedges, fences and walls are fields of `enclosure_m`.
+// Shapes in gardens. Hedges, fences, walls, thickets and banks are fields of `enclosure_m`.
 struct GardenShapes {
-  ShapeRange trees, bushes, hedges, fences, walls;
+  ShapeRange trees, bushes, hedges, fences, walls, thickets, banks;
 };
 
 constexpr double enclosure_m = 3.0;
@@ -70,6 +70,8 @@ GardenShapes add_garden_shapes(City& city, bool many, Random& random) {
     shapes.hedges = city.add_shapes(4, [&] { return make_any_hedge(field_m, fork()); });
     shapes.fences = city.add_shapes(6, [&] { return make_any_fence(field_m, fork()); });
     shapes.walls = city.add_shapes(3, [&] { return make_any_wall(field_m, fork()); });
+    shapes.thickets = city.add_shapes(5, [&] { return make_any_thicket(field_m, fork()); });
+    shapes.banks = city.add_shapes(3, [&] { return make_any_bank(field_m, fork()); });
     return shapes;
   }
   shapes.trees = city.add_shapes(8, [&] { return make_tree(fork()); });
@@ -79,6 +81,7 @@ GardenShapes add_garden_shapes(City& city, bool many, Random& random) {
   shapes.fences = city.add_shapes(1, [&] { return make_railing(field_m); });
   shapes.fences.count += city.add_shapes(1, [&] { return make_wooden_fence(field_m); }).count;
   shapes.walls = city.add_shapes(1, [&] { return make_garden_wall(field_m); });
+  shapes.thickets = shapes.banks = shapes.hedges;
   return shapes;
 }
 
@@ -102,6 +105,7 @@ class BlockFiller {
     for (const Frontage& side : sides) {
       if (open || wood) {
         if (random_.chance(0.4)) enclose(side, 0.0, side.length_m);
+        if (plan.share_thicket > 0.0 && random_.chance(wood ? 0.7 : 0.4)) overgrow(side);
       } else {
         add_lots(side);
       }
@@ -160,12 +164,12 @@ class BlockFiller {
     if (!ground_.plan().many_shapes) return house;
     house.outbuildings = !halls_;
     house.share_windows =
-        static_cast<float>(halls_ ? random_.uniform(0.0, 0.3) : random_.uniform(0.3, 1.0));
+        static_cast<float>(halls_ ? random_.uniform(0.0, 0.3) : random_.uniform(0.1, 1.0));
     house.balconies = house.balconies && !halls_;
     return house;
   }
 
-  // Fence, hedge or wall between the sidewalk and the lot, with a gate.
+  // Fence, hedge, wall or thicket between the sidewalk and the lot, with a gate.
   void enclose(const Frontage& side, double at, double width) {
     const BlockPlan& plan = ground_.plan().blocks;
     const double kind = random_.uniform();
@@ -181,7 +185,25 @@ class BlockFiller {
         plant(shapes_.hedges.draw(random_), spot, side.heading());
       } else if (kind < plan.share_fence + plan.share_hedge + plan.share_wall) {
         plant(shapes_.walls.first + fence % shapes_.walls.count, spot, side.heading());
+      } else if (kind <
+                 plan.share_fence + plan.share_hedge + plan.share_wall + plan.share_thicket) {
+        plant(shapes_.thickets.draw(random_), side.at(x, 1.5), side.heading());
       }
+    }
+  }
+
+  // A thicket or a bank along the whole side, some metres behind the street, nearer and farther in
+  // pieces.
+  void overgrow(const Frontage& side) {
+    const bool is_bank = random_.chance(0.4);
+    const std::size_t bank = shapes_.banks.draw(random_);
+    const double from_m = random_.uniform(is_bank ? 0.3 : 1.5, is_bank ? 3.0 : 8.0);
+    const double uneven_m = random_.uniform(0.0, is_bank ? 0.3 : 1.5);
+    for (double x = 0.0; x + enclosure_m <= side.length_m; x += enclosure_m) {
+      const Vector2d spot = side.at(x, from_m + random_.uniform(-0.5, 0.5) * uneven_m);
+      if (ground_.zone(side.at(x + 1.5, from_m)) != Zone::lot) continue;
+      if (!is_bank && random_.chance(0.1)) continue;
+      plant(is_bank ? bank : shapes_.thickets.draw(random_), spot, side.heading());
     }
   }
 

@@ -37,11 +37,15 @@ struct BuildingPlan {
 /// 0.5 to 3.5 m wide: dense, loose, or of several tufts.
 [[nodiscard]] Mesh make_any_bush(Random random);
 
-// Hedges, fences and walls reach from the origin `length_m` along x.
+// Hedges, thickets, banks, fences and walls reach from the origin `length_m` along x.
 
 [[nodiscard]] Mesh make_hedge(float length_m, float height_m, float depth_m, Random random);
 /// Uneven in height and depth.
 [[nodiscard]] Mesh make_any_hedge(float length_m, Random random);
+/// Brush, or the edge of a wood: 1.8 to 7 m high, bumpy, with holes or without.
+[[nodiscard]] Mesh make_any_thicket(float length_m, Random random);
+/// An overgrown slope that rises from the origin along y, by 0.8 to 5 m over 1 to 15 m.
+[[nodiscard]] Mesh make_any_bank(float length_m, Random random);
 
 [[nodiscard]] Mesh make_wooden_fence(float length_m);
 [[nodiscard]] Mesh make_railing(float length_m);

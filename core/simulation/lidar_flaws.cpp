@@ -20,7 +20,7 @@ std::vector<BeamFlaw> random_beams(const SensorModel& sensor, Random& random) {
   const bool two_blocks = sensor.rings > 32 && !sensor.beam_elevations.empty();
   const double error =
       (two_blocks ? random.uniform(0.04, 0.1) : random.uniform(0.0, 0.06)) * degree;
-  const double spread = random.uniform(0.0, 0.3);
+  const double spread = random.uniform(0.0, random.chance(0.6) ? 0.12 : 0.3);
   const double upper_m = two_blocks ? random.uniform(0.05, 0.17) : 0.0;
   const double lower_m = two_blocks ? random.uniform(0.02, 0.14) : 0.0;
   const double share_weak = random.uniform(0.0, 0.12);
@@ -66,6 +66,7 @@ bool LidarFlaws::is_blind(double azimuth, double elevation, std::size_t ring) co
 }
 
 float LidarFlaws::reported_intensity(float intensity, std::size_t ring) const {
+  if (intensity < intensity_floor) return 0.0F;
   const double bright = beam(ring).gain * intensity_gain * std::pow(intensity, intensity_gamma);
   double reported = std::clamp(bright + intensity_offset, 0.0, 1.0);
   if (intensity_step > 0.0) reported = intensity_step * std::round(reported / intensity_step);
@@ -80,8 +81,10 @@ std::string LidarFlaws::faults(const SensorModel& sensor) const {
   if (!(mixed_share >= 0.0 && mixed_share <= 1.0)) {
     out << "flaws.mixed_share is " << mixed_share << ", must be 0 to 1\n";
   }
-  if (!(intensity_gain > 0.0 && intensity_gamma > 0.0 && intensity_step >= 0.0)) {
-    out << "flaws.intensity_gain and intensity_gamma must be above 0, intensity_step 0 or more\n";
+  if (!(intensity_gain > 0.0 && intensity_gamma > 0.0 && intensity_step >= 0.0 &&
+        intensity_floor >= 0.0)) {
+    out << "flaws.intensity_gain and intensity_gamma must be above 0, intensity_step and "
+           "intensity_floor 0 or more\n";
   }
   return out.str();
 }
@@ -92,9 +95,13 @@ LidarFlaws random_flaws(const SensorModel& sensor, Random random) {
   flaws.blind_spots = random_blind_spots(sensor, random);
   flaws.roll = 0.7 * degree * random.normal();
   flaws.pitch = 0.7 * degree * random.normal();
-  // Sensors compress or stretch contrast; a surface of 0.25 is reported as 0.12 to 0.45.
-  flaws.intensity_gamma = random.uniform(0.3, 1.2);
-  flaws.intensity_gain = random.uniform(0.12, 0.45) / std::pow(0.25, flaws.intensity_gamma);
+  // Sensors compress or stretch contrast; a surface of 0.25 is reported as 0.12 to 0.45. A HDL-64E
+  // as KITTI has it shows ground and walls nearly alike, and what is dark as 0.
+  const bool equalised = random.chance(0.7);
+  flaws.intensity_gamma = equalised ? random.uniform(0.12, 0.4) : random.uniform(0.3, 1.2);
+  flaws.intensity_gain =
+      random.uniform(equalised ? 0.25 : 0.12, 0.45) / std::pow(0.25, flaws.intensity_gamma);
+  flaws.intensity_floor = equalised ? random.uniform(0.0, 0.04) : 0.0;
   flaws.intensity_offset = random.uniform(-0.1, 0.05);
   flaws.intensity_step = random.chance(0.5) ? 0.01 : 1.0 / 255.0;
   flaws.mixed_share = random.uniform(0.0, 0.4);
@@ -127,7 +134,9 @@ std::optional<BeamReturn> beam_return(const BeamNoise& noise, float range_m, flo
   if (random.uniform() * (1.0 + faint) > 1.0) return std::nullopt;
   // The intensity that the sensor reports is corrected for range, but not fully.
   const double falloff = 1.0 / (1.0 + range_m * range_m / (70.0 * 70.0));
-  const double intensity = 0.85 * reflected * falloff + noise.intensity_sigma * random.normal();
+  const double gloss = surface.gloss > 0.0F ? std::pow(cos_incidence, surface.gloss) : 1.0;
+  const double intensity =
+      0.85 * reflected * falloff * gloss + noise.intensity_sigma * random.normal();
   double range = range_m + noise.range_sigma_m * random.normal();
   if (surface.pile_m > 0.0F) {
     constexpr double deepest_m = 0.5;

@@ -60,6 +60,8 @@ struct LidarFlaws {
   /// Reported intensity: gain * intensity^gamma + offset, rounded to steps (0: not rounded).
   double intensity_gain = 1.0, intensity_gamma = 1.0, intensity_offset = 0.0;
   double intensity_step = 0.0;
+  /// Intensity below which 0 is reported.
+  double intensity_floor = 0.0;
   /// Share of returns at depth edges that lie between the two surfaces.
   double mixed_share = 0.0;
 

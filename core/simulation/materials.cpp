@@ -24,6 +24,10 @@ void draw_lost(Materials& materials, Surface surface, double min_lost, double ma
   materials.properties[static_cast<std::size_t>(surface)].lost = random.between(min_lost, max_lost);
 }
 
+void draw_gloss(Materials& materials, Surface surface, double max_gloss, Random& random) {
+  materials.properties[static_cast<std::size_t>(surface)].gloss = random.between(0.0, max_gloss);
+}
+
 // Water mirrors beams away.
 void wet(Materials& materials, Random& random) {
   for (const Surface surface : {Surface::asphalt, Surface::parking_bay, Surface::lane_marking}) {
@@ -92,8 +96,12 @@ Materials default_materials() {
 
 Materials random_materials(Random random) {
   Materials materials = default_materials();
-  for (SurfaceProperties& properties : materials.properties) {
-    properties.reflectivity *= static_cast<float>(std::exp(random.uniform(-0.7, 0.8)));
+  for (std::size_t i = 0; i < surface_count; ++i) {
+    // Asphalt is darker than slabs, and slabs than grass, nearly everywhere.
+    const bool is_ground = i <= static_cast<std::size_t>(Surface::grass);
+    const double spread = is_ground ? 0.3 : 0.6;
+    materials.properties[i].reflectivity *=
+        static_cast<float>(std::exp(random.uniform(-spread, spread)));
   }
   // Bays often share the road's asphalt.
   if (random.chance(0.5)) {
@@ -110,6 +118,10 @@ Materials random_materials(Random random) {
   draw_lost(materials, Surface::glass, 0.3, 0.95, random);
   draw_lost(materials, Surface::tyre, 0.0, 0.5, random);
   draw_lost(materials, Surface::fence_mesh, 0.0, 0.4, random);
+  draw_gloss(materials, Surface::paint, 8.0, random);
+  draw_gloss(materials, Surface::glass, 5.0, random);
+  for (const Surface metal : {Surface::pole, Surface::fence_metal, Surface::sign_back})
+    draw_gloss(materials, metal, 2.0, random);
   if (random.chance(0.15)) wet(materials, random);
   materials.lost_in_panes = true;
   materials.patchiness = random.uniform(0.0, 0.6);

@@ -54,6 +54,9 @@ struct SurfaceProperties {
   float lost = 0.0F;
   /// Depth of blades, twigs or cloth over the surface that return some beams early [m].
   float pile_m = 0.0F;
+  /// Intensity falls by this power of the cosine of incidence beyond that of rough surfaces: what
+  /// is smooth mirrors most of the light away.
+  float gloss = 0.0F;
 };
 
 inline constexpr std::size_t surface_count = static_cast<std::size_t>(Surface::skin) + 1;

@@ -57,11 +57,11 @@ StreetProfile random_profile(Random& random) {
   profile.bike_lane_m = random.chance(0.3) ? random.uniform(1.0, 1.8) : random.uniform(0.0, 0.5);
   const double parking = random.uniform();
   profile.parking_m = 0.0;
-  if (parking > 0.45) profile.parking_m = random.uniform(2.0, 2.6);
+  if (parking > 0.7) profile.parking_m = random.uniform(2.0, 2.6);
   if (parking > 0.87) profile.parking_m = random.uniform(4.4, 5.6);
-  profile.verge_m = random.chance(0.5) ? random.uniform(0.6, 4.0) : 0.0;
+  profile.verge_m = random.chance(0.5) ? random.uniform(0.6, 6.0) : 0.0;
   profile.sidewalk_m =
-      random.chance(0.12) ? 0.0 : random.uniform(1.2, random.chance(0.5) ? 5.0 : 2.5);
+      random.chance(0.12) ? 0.0 : random.uniform(1.2, random.chance(0.5) ? 6.5 : 3.0);
   return profile;
 }
 
@@ -98,7 +98,7 @@ void draw_ground(CityPlan& plan, Random& random) {
   plan.share_driveways = random.chance(0.6) ? random.uniform(0.1, 0.8) : 0.0;
   plan.embankment_m = random.chance(0.5) ? random.uniform(0.3, 3.5) : 0.0;
   plan.tufts_m = random.uniform(0.0, 0.08);
-  plan.paved_medians = random.chance(0.5);
+  plan.paved_medians = random.chance(0.2);
 }
 
 // Car parks and gravel yards beside the streets.
@@ -106,7 +106,7 @@ void draw_patches(CityPlan& plan, Random& random) {
   const double half = plan.route_profile.half_street_m();
   const double width = plan.streets_along_v.back().position_m;
   const double depth = plan.streets_along_u.back().position_m;
-  const std::size_t count = random.index(4);
+  const std::size_t count = random.index(3);
   for (std::size_t i = 0; i < count; ++i) {
     const double u = random.uniform(half, width - half - 12.0);
     const bool beyond = random.chance(0.5);
@@ -116,7 +116,7 @@ void draw_patches(CityPlan& plan, Random& random) {
     const Vector2d low(u, inner);
     const Vector2d high(u + random.uniform(12.0, 40.0), inner + far);
     plan.patches.push_back(
-        {Eigen::AlignedBox2d(low, high), random.chance(0.6) ? Zone::parking : Zone::other});
+        {Eigen::AlignedBox2d(low, high), random.chance(0.75) ? Zone::parking : Zone::other});
   }
 }
 
@@ -130,20 +130,23 @@ void draw_blocks(CityPlan& plan, Random& random) {
   blocks.floors_max = blocks.floors_min + static_cast<int>(random.index(suburb ? 3 : 5));
   blocks.trees_per_100m = random.uniform(5.0, 30.0);
   blocks.garden_trees_per_100m = random.uniform(10.0, 90.0);
-  blocks.share_fence = random.uniform(0.2, 0.75);
-  blocks.share_hedge = random.uniform(0.0, 0.95 - blocks.share_fence);
-  blocks.share_wall = 0.95 - blocks.share_fence - blocks.share_hedge;
+  blocks.share_fence = random.uniform(0.1, 0.6);
+  blocks.share_hedge = random.uniform(0.1, 0.95 - blocks.share_fence);
+  blocks.share_thicket = random.uniform(0.0, 0.95 - blocks.share_fence - blocks.share_hedge);
+  blocks.share_wall = 0.95 - blocks.share_fence - blocks.share_hedge - blocks.share_thicket;
   if (random.chance(0.5)) blocks.share_wall *= random.uniform();
-  blocks.share_open = random.chance(0.5) ? random.uniform(0.0, 0.4) : 0.05;
-  blocks.share_wood = random.chance(0.7) ? random.uniform(0.1, 0.6) : 0.05;
-  blocks.share_halls = random.chance(0.3) ? random.uniform(0.0, 0.2) : 0.0;
+  // Roads through fields and woods show few houses or none.
+  const double houses = random.chance(0.3) ? random.uniform(0.0, 0.5) : random.uniform(0.5, 1.0);
+  blocks.share_open = (1.0 - houses) * random.uniform();
+  blocks.share_wood = 1.0 - houses - blocks.share_open;
+  blocks.share_halls = random.chance(0.3) ? houses * random.uniform(0.0, 0.4) : 0.0;
 }
 
 void draw_traffic(CityPlan& plan, Random& random) {
   plan.traffic = {
       .vehicles_per_km = random.uniform(0.0, 35.0),
-      .share_trucks = random.uniform(0.0, 0.2),
-      .share_buses = random.uniform(0.0, 0.15),
+      .share_trucks = random.uniform(0.0, 0.12),
+      .share_buses = random.uniform(0.0, 0.1),
       .cyclists_per_km = random.uniform(0.0, 35.0),
       .pedestrians_per_km = random.uniform(0.0, 60.0),
       .crossing_pedestrians = static_cast<int>(random.index(8)),
@@ -154,7 +157,7 @@ void draw_traffic(CityPlan& plan, Random& random) {
       .share_other_vehicles = random.uniform(0.0, 0.12),
       .groups_per_100m = random.uniform(0.0, 5.0)};
   plan.parking = {.share_motorcycles = random.uniform(0.0, 0.2),
-                  .share_trucks = random.uniform(0.0, 0.15),
+                  .share_trucks = random.uniform(0.0, 0.1),
                   .share_buses = random.uniform(0.0, 0.06),
                   .share_other_vehicles = random.uniform(0.0, 0.12),
                   .share_bicycles = random.uniform(0.0, 0.3)};

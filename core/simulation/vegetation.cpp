@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "core/simulation/city_shapes.hpp"
 
@@ -77,6 +78,50 @@ void add_conifer_crown(Mesh& mesh, const TreePlan& tree, const Vector3f& top, Ra
     const Vector3f radii(wide, wide, 0.7F * crown_m / tiers);
     add_leaf_ball(mesh, top + Vector3f(0, 0, part * crown_m), radii, foliage_of(tree, radii),
                   random);
+  }
+}
+
+// A wall of leaves along x; `open` is the share of it that rays pass.
+struct LeafyWall {
+  float length_m, height_m, depth_m, bump_m;
+  double open;
+};
+
+// Both fronts, round towards the top, of pieces that stand out by up to `bump_m`.
+void add_leafy_fronts(Mesh& mesh, const LeafyWall& wall, Random& random) {
+  constexpr float piece_m = 0.25F;
+  constexpr float buried_m = 0.4F;
+  const auto columns = static_cast<std::size_t>(std::lround(wall.length_m / piece_m)) + 1;
+  const auto rows = static_cast<std::size_t>(std::lround((wall.height_m + buried_m) / piece_m)) + 1;
+  std::vector<Vector3f> front(columns * rows);
+  for (const float side : {-1.0F, 1.0F}) {
+    for (std::size_t i = 0; i < front.size(); ++i) {
+      const float up = static_cast<float>(i / columns) / static_cast<float>(rows - 1);
+      const float half = 0.5F * wall.depth_m * std::sqrt(1.0F - 0.9F * up * up * up * up);
+      const float out = half + wall.bump_m * random.between(-1.0, 1.0);
+      front[i] = {piece_m * static_cast<float>(i % columns), side * out,
+                  up * (wall.height_m + buried_m) - buried_m +
+                      up * wall.bump_m * random.between(-0.5, 0.5)};
+    }
+    for (std::size_t row = 0; row + 1 < rows; ++row) {
+      for (std::size_t i = row * columns; i + 1 < (row + 1) * columns; ++i) {
+        if (random.chance(wall.open)) continue;
+        mesh.add_quad(front[i], front[i + 1], front[i + columns + 1], front[i + columns],
+                      Surface::hedge);
+      }
+    }
+  }
+}
+
+void add_leafy_wall(Mesh& mesh, const LeafyWall& wall, Random& random) {
+  add_leafy_fronts(mesh, wall, random);
+  const auto leaves = static_cast<int>(10.0F * wall.length_m * wall.height_m);
+  const float leaf_m = random.between(0.06, 0.2);
+  for (int i = 0; i < leaves; ++i) {
+    const float out = 0.5F * wall.depth_m + wall.bump_m * random.between(-0.5, 1.5);
+    const Vector3f spot(random.between(0.0, 1.0) * wall.length_m, random.chance(0.5) ? out : -out,
+                        random.between(0.0, 1.05) * wall.height_m);
+    add_leaf(mesh, spot, leaf_m, random, Surface::hedge);
   }
 }
 
@@ -174,6 +219,11 @@ Mesh make_any_hedge(float length_m, Random random) {
   Mesh mesh;
   const float height = random.between(0.5, random.chance(0.5) ? 3.0 : 1.8);
   const float depth = random.between(0.4, 1.2);
+  if (random.chance(0.6)) {
+    const float bump = random.between(0.02, 0.2);
+    add_leafy_wall(mesh, {length_m, height, depth, bump, random.uniform(0.0, 0.05)}, random);
+    return mesh;
+  }
   const float uneven = random.chance(0.3) ? 0.3F : 0.1F;
   constexpr float piece_m = 0.25F;
   for (float x = 0.0F; x < length_m; x += piece_m) {
@@ -186,6 +236,46 @@ Mesh make_any_hedge(float length_m, Random random) {
                           random.between(0.02, 1.08) * top);
       add_leaf(mesh, spot, 0.09F, random, Surface::hedge);
     }
+  }
+  return mesh;
+}
+
+Mesh make_any_thicket(float length_m, Random random) {
+  Mesh mesh;
+  const float height = random.between(1.8, random.chance(0.5) ? 7.0 : 4.0);
+  const float depth = random.between(0.8, 3.0);
+  const float bump = random.between(0.1, 0.6);
+  add_leafy_wall(mesh, {length_m, height, depth, bump, random.uniform(0.0, 0.3)}, random);
+  return mesh;
+}
+
+Mesh make_any_bank(float length_m, Random random) {
+  Mesh mesh;
+  const float height = random.between(0.8, random.chance(0.5) ? 5.0 : 2.5);
+  const float depth = height * random.between(1.2, 3.0);
+  const float bump = random.between(0.03, 0.35);
+  constexpr float piece_m = 0.3F;
+  const auto columns = static_cast<std::size_t>(std::lround(length_m / piece_m)) + 1;
+  const auto rows = static_cast<std::size_t>(std::lround(depth / piece_m)) + 1;
+  std::vector<Vector3f> slope(columns * rows);
+  for (std::size_t i = 0; i < slope.size(); ++i) {
+    const float in = static_cast<float>(i / columns) / static_cast<float>(rows - 1);
+    slope[i] = {piece_m * static_cast<float>(i % columns), in * depth,
+                (in > 0.0F ? 0.2F : -0.4F) + in * height + bump * random.between(-1.0, 1.0)};
+  }
+  for (std::size_t row = 0; row + 1 < rows; ++row) {
+    for (std::size_t i = row * columns; i + 1 < (row + 1) * columns; ++i) {
+      mesh.add_quad(slope[i], slope[i + 1], slope[i + columns + 1], slope[i + columns],
+                    Surface::hedge);
+    }
+  }
+  const auto leaves = static_cast<int>(6.0F * length_m * depth);
+  const float leaf_m = random.between(0.06, 0.2);
+  for (int i = 0; i < leaves; ++i) {
+    const float in = random.between(0.0, 1.0);
+    const Vector3f spot(random.between(0.0, 1.0) * length_m, in * depth,
+                        0.2F + in * height + bump * random.between(0.0, 2.0));
+    add_leaf(mesh, spot, leaf_m, random, Surface::hedge);
   }
   return mesh;
 }

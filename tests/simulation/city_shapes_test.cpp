@@ -3,7 +3,9 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <functional>
+#include <vector>
 
 #include "core/simulation/ray_scene.hpp"
 
@@ -27,6 +29,8 @@ std::vector<Kind> kinds() {
   return {{"tree", make_any_tree, 16.0F, 2.0F, 20.0F},
           {"bush", make_any_bush, 5.0F, 0.2F, 5.0F},
           {"hedge", [](Random r) { return make_any_hedge(3.0F, r); }, 3.5F, 0.3F, 3.5F},
+          {"thicket", [](Random r) { return make_any_thicket(3.0F, r); }, 3.5F, 1.4F, 7.5F},
+          {"bank", [](Random r) { return make_any_bank(3.0F, r); }, 15.5F, 0.7F, 6.5F},
           {"fence", [](Random r) { return make_any_fence(3.0F, r); }, 3.5F, 0.5F, 2.8F},
           {"wall", [](Random r) { return make_any_wall(3.0F, r); }, 3.5F, 0.35F, 3.5F},
           {"light", make_any_street_light, 4.0F, 2.9F, 10.5F},
@@ -87,20 +91,41 @@ TEST(AnyShape, FencesAreSeenThroughMoreOrLess) {
   EXPECT_GT(loose, 15);
 }
 
-TEST(AnyShape, HedgesAreNotBoxes) {
-  const Mesh hedge = make_any_hedge(3.0F, Random(6));
+// Ranges to a field from 5 m beside it, along a line 0.3 m high; rays that pass it left out.
+std::vector<float> ranges_along(const Mesh& mesh) {
   const StandingMesh standing{0, Eigen::Isometry3d::Identity()};
-  const RayScene scene({&hedge}, std::span(&standing, 1));
+  const RayScene scene({&mesh}, std::span(&standing, 1));
   const RaySnapshot snapshot = scene.with({});
-  float nearest = 10.0F, farthest = 0.0F;
+  std::vector<float> ranges_m;
   for (int i = 0; i < 200; ++i) {
     const float x = 0.1F + 2.8F * static_cast<float>(i) / 200.0F;
-    const auto hit = snapshot.cast({{x, -5, 0.3F}, {0, 1, 0}, 10.0F});
-    if (!hit) continue;
-    nearest = std::min(nearest, hit->range_m);
-    farthest = std::max(farthest, hit->range_m);
+    if (const auto hit = snapshot.cast({{x, -5, 0.3F}, {0, 1, 0}, 10.0F}))
+      ranges_m.push_back(hit->range_m);
   }
-  EXPECT_GT(farthest - nearest, 0.08F);
+  return ranges_m;
+}
+
+TEST(AnyShape, HedgesAndThicketsAreNotBoxes) {
+  for (const auto make : {make_any_hedge, make_any_thicket}) {
+    for (std::uint64_t seed = 0; seed < 30; ++seed) {
+      const std::vector<float> ranges_m = ranges_along(make(3.0F, Random(seed)));
+      ASSERT_GT(ranges_m.size(), 100U) << seed;
+      const auto [nearest, farthest] = std::ranges::minmax(ranges_m);
+      EXPECT_GT(farthest - nearest, 0.02F) << seed;
+    }
+  }
+}
+
+TEST(AnyShape, ThicketsAreDenseOrShowWhatIsBehind) {
+  int dense = 0, loose = 0;
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    const double share = opacity(make_any_thicket(3.0F, Random(seed)));
+    EXPECT_GT(share, 0.5) << seed;
+    dense += share > 0.98 ? 1 : 0;
+    loose += share < 0.95 ? 1 : 0;
+  }
+  EXPECT_GT(dense, 10);
+  EXPECT_GT(loose, 5);
 }
 
 TEST(AnyShape, OutbuildingsStandOutOfTheFront) {

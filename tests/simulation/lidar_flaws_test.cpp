@@ -59,6 +59,18 @@ TEST(BeamNoise, IntensityFollowsReflectivityAngleAndStaysInRange) {
   EXPECT_LE(fire(noise, 5.0F, 1.0F, {81, 5.0F}).intensity, 1.0);
 }
 
+TEST(BeamNoise, GlossDarkensWhatIsSeenAskewAndLosesNoBeams) {
+  SurfaceProperties glossy = grey;
+  glossy.gloss = 4.0F;
+  const BeamNoise noise;
+  EXPECT_DOUBLE_EQ(fire(noise, 20.0F, 1.0F, glossy).intensity,
+                   fire(noise, 20.0F, 1.0F, grey).intensity);
+  const Statistics rough = fire(noise, 20.0F, 0.5F, grey);
+  const Statistics smooth = fire(noise, 20.0F, 0.5F, glossy);
+  EXPECT_NEAR(smooth.intensity, rough.intensity / 16.0, 0.01);
+  EXPECT_EQ(smooth.share, rough.share);
+}
+
 TEST(BeamNoise, SilentNoiseChangesNothing) {
   const BeamNoise none{.range_sigma_m = 0, .drop_share = 0, .intensity_sigma = 0, .min_return = 0};
   const Statistics all = fire(none, 100.0F, 0.01F, grey);
@@ -150,6 +162,14 @@ TEST(LidarFlaws, IntensityIsMappedAndRounded) {
   EXPECT_EQ(flaws.reported_intensity(0.4F, 0), 0.0F);
 }
 
+TEST(LidarFlaws, WhatIsDarkerThanTheFloorIsReportedAsZero) {
+  LidarFlaws flaws;
+  flaws.intensity_gamma = 0.2;
+  flaws.intensity_floor = 0.03;
+  EXPECT_EQ(flaws.reported_intensity(0.029F, 0), 0.0F);
+  EXPECT_GT(flaws.reported_intensity(0.031F, 0), 0.4F);
+}
+
 TEST(LidarFlaws, MixedReturnsLieBetweenTheSurfaces) {
   SimulationConfig config = clean_yard();
   const SimulatedScan clean = Simulation(config).scan(0);
@@ -184,8 +204,9 @@ TEST(LidarFlaws, NamesItsFaults) {
   config.flaws.beams.assign(3, {});
   config.flaws.mixed_share = 2.0;
   config.flaws.intensity_gain = 0.0;
+  config.flaws.intensity_floor = -0.1;
   const std::string faults = config.faults();
-  for (const char* field : {"beams", "mixed_share", "intensity_gain"}) {
+  for (const char* field : {"beams", "mixed_share", "intensity_gain", "intensity_floor"}) {
     EXPECT_THAT(faults, testing::HasSubstr(field));
   }
 }

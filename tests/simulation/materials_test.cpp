@@ -24,19 +24,24 @@ TEST(Materials, DrawnOnesKeepClassesAndStayPhysical) {
       EXPECT_EQ(properties.label, properties_of(static_cast<Surface>(i)).label);
       EXPECT_GT(properties.reflectivity, 0.0F);
       EXPECT_LE(properties.lost, 1.0F);
+      EXPECT_GE(properties.gloss, 0.0F);
       EXPECT_LT(properties.pile_m, 0.5F);
     }
   }
 }
 
-TEST(Materials, DrawnRoadsAreDarkAndBright) {
+TEST(Materials, DrawnRoadsAreDarkAndBrightAndDarkerThanGrass) {
   std::vector<float> asphalt;
+  int darker_than_grass = 0;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    asphalt.push_back(random_materials(Random(seed)).of(Surface::asphalt).reflectivity);
+    const Materials materials = random_materials(Random(seed));
+    asphalt.push_back(materials.of(Surface::asphalt).reflectivity);
+    darker_than_grass += asphalt.back() < materials.of(Surface::grass).reflectivity ? 1 : 0;
   }
   const auto [darkest, brightest] = std::ranges::minmax(asphalt);
   EXPECT_LT(darkest, 0.12F);
-  EXPECT_GT(brightest, 0.35F);
+  EXPECT_GT(brightest, 0.25F);
+  EXPECT_GT(darker_than_grass, 95);
 }
 
 TEST(Materials, PatchesAverageToOneWithinTheirStrength) {

@@ -27,7 +27,7 @@ TEST(TrainingPlan, IsWithoutFaultWhateverIsDrawn) {
 TEST(TrainingPlan, VariesEverything) {
   std::set<int> lanes;
   std::map<std::string, int> sensors;
-  int without_sidewalk = 0, without_kerb = 0, sloped = 0, with_car_park = 0;
+  int without_sidewalk = 0, without_kerb = 0, sloped = 0, with_car_park = 0, without_houses = 0;
   constexpr int sequences = 600;
   for (std::uint64_t seed = 0; seed < sequences; ++seed) {
     const SimulationConfig sequence = training_sequence(seed);
@@ -37,13 +37,18 @@ TEST(TrainingPlan, VariesEverything) {
     without_kerb += sequence.plan.kerb_m == 0.0 ? 1 : 0;
     sloped += sequence.plan.embankment_m > 1.0 ? 1 : 0;
     with_car_park += sequence.plan.patches.empty() ? 0 : 1;
+    const BlockPlan& blocks = sequence.plan.blocks;
+    without_houses += blocks.share_open + blocks.share_wood > 0.6 ? 1 : 0;
+    EXPECT_LE(blocks.share_fence + blocks.share_hedge + blocks.share_wall + blocks.share_thicket,
+              1.0);
+    EXPECT_LE(blocks.share_open + blocks.share_wood + blocks.share_halls, 1.0 + 1e-9);
   }
   EXPECT_EQ(lanes, (std::set{1, 2, 3}));
   EXPECT_NEAR(sensors["HDL-64E"], 0.6 * sequences, 0.08 * sequences);
   EXPECT_NEAR(sensors["VLP-16"], 0.2 * sequences, 0.06 * sequences);
   EXPECT_NEAR(sensors["HDL-32E"], 0.1 * sequences, 0.05 * sequences);
   EXPECT_EQ(sensors.size(), 4U);
-  for (const int count : {without_sidewalk, without_kerb, sloped, with_car_park}) {
+  for (const int count : {without_sidewalk, without_kerb, sloped, with_car_park, without_houses}) {
     EXPECT_GT(count, sequences / 20);
     EXPECT_LT(count, sequences);
   }
