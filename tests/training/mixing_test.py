@@ -1,11 +1,13 @@
 """Parts and objects of scans in other scans, and how often each scan is drawn."""
 
+import tempfile
 import unittest
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 
-from leave_out import fold_config
+from leave_out import fold_config, sequences_of
 from mixing import Objects, height_of_ground, mix_bands, mix_sectors, turned
 from range_images import ImageModel, elevation_rad
 from samples import BatchesBySensor
@@ -113,6 +115,20 @@ class LeavingOut(unittest.TestCase):
         self.assertEqual(changed["validation_sequences"], ["00", "07"])
         with self.assertRaises(SystemExit):
             fold_config(config, ["08"], ["00", "01"])
+
+    def test_finds_sequences_of_any_sensor(self):
+        with tempfile.TemporaryDirectory() as root:
+            for name in ("00", "1000"):
+                sequence = Path(root) / "sequences" / name
+                for part, size in (("velodyne", 16), ("labels", 4)):
+                    (sequence / part).mkdir(parents=True)
+                    suffix = ".bin" if part == "velodyne" else ".label"
+                    (sequence / part / f"000000{suffix}").write_bytes(bytes(size))
+            sensor = "rings: 16\nfov_up_deg: 15\nfov_down_deg: -15\n"
+            (Path(root) / "sequences" / "1000" / "sensor.yaml").write_text(sensor)
+            image = {"rows": 64, "columns": 512, "fov_up_deg": 3, "fov_down_deg": -25}
+            config = {"data": {"train": [root], "train_sequences": []}, "image": image}
+            self.assertEqual(sequences_of(config), ["00", "1000"])
 
 
 if __name__ == "__main__":

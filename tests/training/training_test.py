@@ -295,7 +295,7 @@ class Training(unittest.TestCase):
             self.assertGreater((self.root / "run" / picture).stat().st_size, 1000)
         sequence = self.data / "sequences" / "00"
         command = [sys.executable, TRAINING / "export.py", self.root / "run", self.root / "model"]
-        command += ["--stillmap", STILLMAP, "--calibrate", sequence]
+        command += ["--last", "--stillmap", STILLMAP, "--calibrate", sequence]
         result = subprocess.run([*map(str, command)], capture_output=True, text=True)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("onednn   int8", result.stdout)

@@ -17,9 +17,9 @@ from model_folder import check_engines, class_names, describe, random_images, wr
 from networks import make_network
 
 
-def load_run(folder):
-    """The network of best.pt, and the run's state."""
-    state = torch.load(folder / "best.pt", map_location="cpu")
+def load_run(folder, file="best.pt"):
+    """The network of best.pt or last.pt, and the run's state."""
+    state = torch.load(folder / file, map_location="cpu")
     network = make_network(state["config"]["network"], len(class_names()))
     network.load_state_dict(state["averaged"])
     return network.eval(), state
@@ -71,6 +71,9 @@ def read_arguments():
     parser.add_argument("--sensor", default="spinning lidars of 16 to 64 beams")
     parser.add_argument("--training", help="how it was trained, in words")
     parser.add_argument("--accuracy", help="how well it does, in words")
+    parser.add_argument(
+        "--last", action="store_true", help="the weights of last.pt, not those of best.pt"
+    )
     parser.add_argument("--calibrate", nargs="*", default=[], help="sequences for int8.yaml")
     parser.add_argument("--stillmap", type=Path, default="build/release/bin/stillmap")
     arguments = parser.parse_args()
@@ -81,7 +84,7 @@ def read_arguments():
 
 def main():
     arguments = read_arguments()
-    network, state = load_run(arguments.run)
+    network, state = load_run(arguments.run, "last.pt" if arguments.last else "best.pt")
     description = describe_run(arguments, state)
     write_model(arguments.folder, network, description)
     engines = [("opencv", "fp32"), ("onednn", "fp32")]

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from range_images import ImageModel
 from scans import CLASS_NAMES, ScanFiles
 from train import Run, read_config, train
 from validation import Confusion
@@ -24,7 +25,8 @@ from validation import Confusion
 def sequences_of(config):
     """Names of all sequences of the training folders, or of those that the configuration lists."""
     data = config["data"]
-    scans = ScanFiles(data["train"], data["train_sequences"], None)
+    image = ImageModel(**config["image"])
+    scans = ScanFiles(data["train"], data["train_sequences"], image)
     return sorted({scan.parent.parent.name for scan, _ in scans.files})
 
 
