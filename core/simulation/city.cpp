@@ -81,6 +81,7 @@ GardenShapes add_garden_shapes(City& city, bool many, Random& random) {
   shapes.fences = city.add_shapes(1, [&] { return make_railing(field_m); });
   shapes.fences.count += city.add_shapes(1, [&] { return make_wooden_fence(field_m); }).count;
   shapes.walls = city.add_shapes(1, [&] { return make_garden_wall(field_m); });
+  // No plain city has any; hedges are drawn where a plan asks for them nevertheless.
   shapes.thickets = shapes.banks = shapes.hedges;
   return shapes;
 }

@@ -92,7 +92,8 @@ struct BlockPlan {
   double garden_trees_per_100m = 6.0;
   /// Share of lots behind a fence, behind a hedge, behind a wall; the rest is open.
   double share_fence = 0.35, share_hedge = 0.25, share_wall = 0.15;
-  /// The same, behind a thicket; where it is not zero, woods and open land have thickets, too.
+  /// The same, behind a thicket; where it is not zero, some woods and open land lie
+  /// behind thickets or overgrown banks, too.
   double share_thicket = 0.0;
   /// Share of blocks that are open land, wood, or halls behind yards; the rest have houses.
   double share_open = 0.0, share_wood = 0.0, share_halls = 0.0;

@@ -81,6 +81,16 @@ void add_conifer_crown(Mesh& mesh, const TreePlan& tree, const Vector3f& top, Ra
   }
 }
 
+// Leaves between the neighbours of a grid of `columns` vertices a row; `open` is the share left
+// out.
+void add_sheet(Mesh& mesh, const std::vector<Vector3f>& grid, std::size_t columns, double open,
+               Random& random) {
+  for (std::size_t i = 0; i + columns < grid.size(); ++i) {
+    if (i % columns + 1 == columns || (open > 0.0 && random.chance(open))) continue;
+    mesh.add_quad(grid[i], grid[i + 1], grid[i + columns + 1], grid[i + columns], Surface::hedge);
+  }
+}
+
 // A wall of leaves along x; `open` is the share of it that rays pass.
 struct LeafyWall {
   float length_m, height_m, depth_m, bump_m;
@@ -103,13 +113,7 @@ void add_leafy_fronts(Mesh& mesh, const LeafyWall& wall, Random& random) {
                   up * (wall.height_m + buried_m) - buried_m +
                       up * wall.bump_m * random.between(-0.5, 0.5)};
     }
-    for (std::size_t row = 0; row + 1 < rows; ++row) {
-      for (std::size_t i = row * columns; i + 1 < (row + 1) * columns; ++i) {
-        if (random.chance(wall.open)) continue;
-        mesh.add_quad(front[i], front[i + 1], front[i + columns + 1], front[i + columns],
-                      Surface::hedge);
-      }
-    }
+    add_sheet(mesh, front, columns, wall.open, random);
   }
 }
 
@@ -263,12 +267,7 @@ Mesh make_any_bank(float length_m, Random random) {
     slope[i] = {piece_m * static_cast<float>(i % columns), in * depth,
                 (in > 0.0F ? 0.2F : -0.4F) + in * height + bump * random.between(-1.0, 1.0)};
   }
-  for (std::size_t row = 0; row + 1 < rows; ++row) {
-    for (std::size_t i = row * columns; i + 1 < (row + 1) * columns; ++i) {
-      mesh.add_quad(slope[i], slope[i + 1], slope[i + columns + 1], slope[i + columns],
-                    Surface::hedge);
-    }
-  }
+  add_sheet(mesh, slope, columns, 0.0, random);
   const auto leaves = static_cast<int>(6.0F * length_m * depth);
   const float leaf_m = random.between(0.06, 0.2);
   for (int i = 0; i < leaves; ++i) {
