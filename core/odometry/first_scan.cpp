@@ -1,9 +1,82 @@
 #include "core/odometry/first_scan.hpp"
 
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <optional>
+#include <utility>
+#include <vector>
+
 #include "core/odometry/registration.hpp"
 #include "core/odometry/scan_features.hpp"
 
 namespace stillmap {
+namespace {
+
+/// Both scans, as a motion between them makes them.
+struct Straightened {
+  LocalMap map;
+  Eigen::Isometry3d T_map_first;
+  OdometryResult second;
+};
+
+/// The scans that are straightened, and how.
+struct TwoScans {
+  const FirstScan& first;
+  const FeatureSets& features;
+  double interval_s;
+  const SweepTimes& sweep;
+  const OdometryConfig& config;
+  const LocalMap& empty_map;
+};
+
+/// From that motion between the scans on; nothing where they do not fit.
+std::optional<Straightened> straightened(const TwoScans& scans, Eigen::Isometry3d T_first_second,
+                                         int rounds) {
+  Straightened result{scans.empty_map, scans.first.T_map_stamp, {}};
+  FeatureSets moving = scans.features;
+  for (int round = 0; round < rounds; ++round) {
+    const PoseTangent velocity = twist_of(T_first_second) / scans.interval_s;
+    result.T_map_first = scans.first.T_map_stamp * motion_of(velocity * scans.first.sweep.middle_s);
+    result.map.clear();
+    extend_local_map(result.map, scans.first.features, result.T_map_first,
+                     velocity * scans.first.sweep.duration_s);
+    moving.sweep_prior.T_map_lidar_last = result.T_map_first;
+    result.second = register_features(moving, result.map,
+                                      result.T_map_first * motion_of(velocity * scans.interval_s),
+                                      scans.config, velocity * scans.sweep.duration_s);
+    if (result.second.health == OdometryHealth::lost) return std::nullopt;
+    T_first_second = result.T_map_first.inverse() * result.second.T_map_lidar;
+  }
+  return result;
+}
+
+/// The motion that was found, and the same way faster: two bent scans amid traffic agree on a part
+/// of the motion, too.
+std::vector<Eigen::Isometry3d> possible_motions(const Eigen::Isometry3d& found, double interval_s,
+                                                double max_speed_m_s) {
+  constexpr double step_m_s = 5.0;
+  constexpr double top_m_s = 30.0;
+  constexpr double min_way_m = 0.05;
+  const double way_m = found.translation().norm();
+  const Eigen::Vector3d direction =
+      way_m > min_way_m ? Eigen::Vector3d(found.translation() / way_m) : Eigen::Vector3d::UnitX();
+  std::vector<Eigen::Isometry3d> motions{found};
+  for (double speed = step_m_s; speed <= std::min(top_m_s, max_speed_m_s); speed += step_m_s) {
+    motions.push_back(found);
+    motions.back().translation() = speed * interval_s * direction;
+  }
+  return motions;
+}
+
+/// Rings on the road fit at any speed: what stands up must fit better, too.
+bool fits_better(const OdometryResult& candidate, const OdometryResult& best) {
+  constexpr double clearly = 1.03;
+  return candidate.fit > clearly * best.fit && candidate.upright_fit > clearly * best.upright_fit;
+}
+
+}  // namespace
 
 bool can_begin_map(const FeatureSets& features, const OdometryConfig& config) {
   const auto needed = static_cast<std::size_t>(config.registration.min_correspondences);
@@ -11,28 +84,32 @@ bool can_begin_map(const FeatureSets& features, const OdometryConfig& config) {
 }
 
 void straighten_first_scan(const FirstScan& first, const FeatureSets& features, double interval_s,
-                           const SweepTimes& sweep, const OdometryConfig& config, LocalMap& map,
-                           RegisteredScan& last, OdometryResult& second) {
-  constexpr int rounds = 4;
-  const LocalMap map_before = map;
-  const Eigen::Isometry3d T_map_lidar_before = last.T_map_lidar;
-  OdometryResult found = second;
-  FeatureSets moving = features;
-  for (int round = 0; round < rounds; ++round) {
-    const PoseTangent velocity =
-        twist_of(last.T_map_lidar.inverse() * found.T_map_lidar) / interval_s;
-    last.T_map_lidar = first.T_map_stamp * motion_of(velocity * first.sweep.middle_s);
-    map.clear();
-    extend_local_map(map, first.features, last.T_map_lidar, velocity * first.sweep.duration_s);
-    moving.sweep_prior.T_map_lidar_last = last.T_map_lidar;
-    found = register_features(moving, map, last.T_map_lidar * motion_of(velocity * interval_s),
-                              config, velocity * sweep.duration_s);
-    if (found.health != OdometryHealth::lost) continue;
-    map = map_before;
-    last.T_map_lidar = T_map_lidar_before;
-    return;
+                           const SweepTimes& sweep, const OdometryConfig& config,
+                           double max_speed_m_s, LocalMap& map, RegisteredScan& last,
+                           OdometryResult& second) {
+  constexpr int first_rounds = 2;
+  constexpr int more_rounds = 4;
+  LocalMap empty_map = map;
+  empty_map.clear();
+  const TwoScans scans{first, features, interval_s, sweep, config, empty_map};
+  const std::vector<Eigen::Isometry3d> motions =
+      possible_motions(last.T_map_lidar.inverse() * second.T_map_lidar, interval_s, max_speed_m_s);
+  std::vector<std::optional<Straightened>> found(motions.size());
+  tbb::parallel_for(std::size_t{0}, motions.size(), [&](std::size_t i) {
+    found[i] = straightened(scans, motions[i], first_rounds);
+  });
+  const std::optional<Straightened>* best = found.data();
+  for (const std::optional<Straightened>& candidate : found) {
+    const bool is_better = candidate && (!*best || fits_better(candidate->second, (*best)->second));
+    if (is_better) best = &candidate;
   }
-  second = found;
+  if (!*best) return;
+  std::optional<Straightened> result = straightened(
+      scans, (*best)->T_map_first.inverse() * (*best)->second.T_map_lidar, more_rounds);
+  if (!result) return;
+  map = std::move(result->map);
+  last.T_map_lidar = result->T_map_first;
+  second = result->second;
 }
 
 }  // namespace stillmap

@@ -16,11 +16,13 @@ struct FirstScan {
 [[nodiscard]] bool can_begin_map(const FeatureSets& features, const OdometryConfig& config);
 
 /// Builds the local map anew from the first scan, compensated for the motion that the second one
-/// shows, and registers that one again; the two converge together. `features` are those of the
-/// second scan, not compensated, `second` its pose, `interval_s` after the first one's, `last` the
-/// first scan's. All stay as they are where they do not converge.
+/// shows, and registers that one again; the two converge together, from that motion or from faster
+/// ones up to `max_speed_m_s`, whichever fits best. `features` are those of the second scan, not
+/// compensated, `second` its pose, `interval_s` after the first one's, `last` the first scan's. All
+/// stay as they are where they do not converge.
 void straighten_first_scan(const FirstScan& first, const FeatureSets& features, double interval_s,
-                           const SweepTimes& sweep, const OdometryConfig& config, LocalMap& map,
-                           RegisteredScan& last, OdometryResult& second);
+                           const SweepTimes& sweep, const OdometryConfig& config,
+                           double max_speed_m_s, LocalMap& map, RegisteredScan& last,
+                           OdometryResult& second);
 
 }  // namespace stillmap

@@ -169,7 +169,8 @@ void Odometry::State::straighten(const FeatureSets& features, std::int64_t time_
   const double interval_s = intervals.stamped_since_last_s(time_ns);
   if (second.health == OdometryHealth::lost || interval_s > max_prediction_s || !features.rolling)
     return;
-  straighten_first_scan(first, features, interval_s, sweep, method(), map, last, second);
+  straighten_first_scan(first, features, interval_s, sweep, method(),
+                        sensor.motion_limits.max_speed_m_s, map, last, second);
 }
 
 void Odometry::State::confirm_place(const FeatureSets& features, const PosePrediction& prediction,
