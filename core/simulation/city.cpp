@@ -54,7 +54,7 @@ std::vector<Frontage> frontages(const Interval& u, const Interval& v) {
 
 // Shapes in gardens. Hedges, fences, walls, thickets and banks are fields of `enclosure_m`.
 struct GardenShapes {
-  ShapeRange trees, bushes, hedges, fences, walls, thickets, banks;
+  ShapeRange trees, bushes, hedges, fences, walls, thickets, banks, barriers;
 };
 
 constexpr double enclosure_m = 3.0;
@@ -72,6 +72,7 @@ GardenShapes add_garden_shapes(City& city, bool many, Random& random) {
     shapes.walls = city.add_shapes(3, [&] { return make_any_wall(field_m, fork()); });
     shapes.thickets = city.add_shapes(5, [&] { return make_any_thicket(field_m, fork()); });
     shapes.banks = city.add_shapes(3, [&] { return make_any_bank(field_m, fork()); });
+    shapes.barriers = city.add_shapes(2, [&] { return make_any_crash_barrier(field_m, fork()); });
     return shapes;
   }
   shapes.trees = city.add_shapes(8, [&] { return make_tree(fork()); });
@@ -81,8 +82,9 @@ GardenShapes add_garden_shapes(City& city, bool many, Random& random) {
   shapes.fences = city.add_shapes(1, [&] { return make_railing(field_m); });
   shapes.fences.count += city.add_shapes(1, [&] { return make_wooden_fence(field_m); }).count;
   shapes.walls = city.add_shapes(1, [&] { return make_garden_wall(field_m); });
-  // No plain city has any; hedges are drawn where a plan asks for them nevertheless.
+  // No plain city has any; hedges and fences are drawn where a plan asks for them nevertheless.
   shapes.thickets = shapes.banks = shapes.hedges;
+  shapes.barriers = shapes.fences;
   return shapes;
 }
 
@@ -105,7 +107,11 @@ class BlockFiller {
     const std::vector<Frontage> sides = frontages(u, v);
     for (const Frontage& side : sides) {
       if (open || wood) {
-        if (random_.chance(0.4)) enclose(side, 0.0, side.length_m);
+        if (plan.share_barrier > 0.0 && random_.chance(plan.share_barrier)) {
+          add_barrier(side);
+        } else if (random_.chance(0.4)) {
+          enclose(side, 0.0, side.length_m);
+        }
         if (plan.share_thicket > 0.0 && random_.chance(wood ? 0.7 : 0.4)) overgrow(side);
       } else {
         add_lots(side);
@@ -190,6 +196,16 @@ class BlockFiller {
                  plan.share_fence + plan.share_hedge + plan.share_wall + plan.share_thicket) {
         plant(shapes_.thickets.draw(random_), side.at(x, 1.5), side.heading());
       }
+    }
+  }
+
+  // A crash barrier along the whole side.
+  void add_barrier(const Frontage& side) {
+    const std::size_t barrier = shapes_.barriers.draw(random_);
+    const double from_m = random_.uniform(0.2, 1.5);
+    for (double x = 0.0; x + enclosure_m <= side.length_m; x += enclosure_m) {
+      if (ground_.zone(side.at(x + 1.5, from_m)) != Zone::lot) continue;
+      plant(barrier, side.at(x, from_m), side.heading());
     }
   }
 

@@ -97,6 +97,8 @@ struct BlockPlan {
   double share_thicket = 0.0;
   /// Share of blocks that are open land, wood, or halls behind yards; the rest have houses.
   double share_open = 0.0, share_wood = 0.0, share_halls = 0.0;
+  /// Share of the sides of open land and wood that have a crash barrier.
+  double share_barrier = 0.0;
 };
 
 /// A city of streets on a grid in flat plan coordinates (u, v) [m]; `GroundShape` bends it into
@@ -127,6 +129,8 @@ struct CityPlan {
   double kerb_m = 0.13;
   /// Share of house fronts with a driveway, where the kerb is lowered.
   double share_driveways = 0.0;
+  /// Share of the yards behind the streets that are paved, in pieces of 14 m.
+  double share_paved_yards = 0.0;
   /// Height of the slopes behind the streets, and of the tufts of grass [m].
   double embankment_m = 0.0;
   double tufts_m = 0.0;

@@ -52,6 +52,9 @@ struct BuildingPlan {
 /// Wire mesh, planks upright or across, railing, posts with rails, crash barrier.
 [[nodiscard]] Mesh make_any_fence(float length_m, Random random);
 
+/// Steel bands on posts, or concrete that widens towards its foot.
+[[nodiscard]] Mesh make_any_crash_barrier(float length_m, Random random);
+
 [[nodiscard]] Mesh make_garden_wall(float length_m);
 /// Low or high, with a pier or a railing on top.
 [[nodiscard]] Mesh make_any_wall(float length_m, Random random);

@@ -53,7 +53,7 @@ class StreetFurnisher {
     }
     const double spread = many_ ? 0.8 : 0.1;
     for (double at = random_.uniform(8.0, 25.0); at < side.length_m;
-         at += many_ ? random_.uniform(6.0, 30.0) : random_.uniform(18.0, 40.0)) {
+         at += many_ ? random_.uniform(10.0, 60.0) : random_.uniform(18.0, 40.0)) {
       if (!is_pavement(side.at(at, kerb))) continue;
       place(many_ ? make_any_sign(random_.fork()) : make_sign(random_.fork()), side.at(at, kerb),
             side.heading() + quarter_turn + random_.uniform(-spread, spread));
@@ -65,7 +65,7 @@ class StreetFurnisher {
     const double kerb = side.profile.half_road_m() + 0.35;
     const double back = side.profile.half_street_m() - 0.5;
     for (double at = random_.uniform(2.0, 20.0); at < side.length_m;
-         at += random_.uniform(4.0, 25.0)) {
+         at += random_.uniform(8.0, 50.0)) {
       const double heading = side.heading() + quarter_turn;
       const double kind = random_.uniform();
       if (kind < 0.45) {

@@ -72,24 +72,6 @@ void add_rails(Mesh& mesh, float length_m, float height, Random& random) {
   add_posts(mesh, length_m, height, 0.05F, Surface::fence_metal);
 }
 
-// Steel bands on posts, or concrete that widens towards its foot.
-void add_crash_barrier(Mesh& mesh, float length_m, Random& random) {
-  if (random.chance(0.6)) {
-    const float low = random.between(0.35, 0.55);
-    for (const float y : {-0.06F, 0.02F}) {
-      add_box(mesh, {0, y, low}, {length_m, y + 0.04F, low + 0.14F}, Surface::fence_metal);
-      add_box(mesh, {0, y, low + 0.17F}, {length_m, y + 0.04F, low + 0.31F}, Surface::fence_metal);
-    }
-    add_posts(mesh, length_m, low + 0.25F, 0.05F, Surface::fence_metal);
-    return;
-  }
-  const float half = 0.5F * length_m;
-  Mesh barrier;
-  add_frustum(barrier, {-half, half, 0.3F, buried_m}, {-half, half, 0.1F, 0.85F},
-              Surface::garden_wall, Surface::garden_wall);
-  mesh.append(barrier, Eigen::Isometry3f(Eigen::Translation3f(half, 0, 0)));
-}
-
 }  // namespace
 
 Mesh make_wooden_fence(float length_m) {
@@ -122,6 +104,25 @@ Mesh make_garden_wall(float length_m) {
   return mesh;
 }
 
+Mesh make_any_crash_barrier(float length_m, Random random) {
+  Mesh mesh;
+  if (random.chance(0.6)) {
+    const float low = random.between(0.35, 0.55);
+    for (const float y : {-0.06F, 0.02F}) {
+      add_box(mesh, {0, y, low}, {length_m, y + 0.04F, low + 0.14F}, Surface::fence_metal);
+      add_box(mesh, {0, y, low + 0.17F}, {length_m, y + 0.04F, low + 0.31F}, Surface::fence_metal);
+    }
+    add_posts(mesh, length_m, low + 0.25F, 0.05F, Surface::fence_metal);
+    return mesh;
+  }
+  const float half = 0.5F * length_m;
+  Mesh barrier;
+  add_frustum(barrier, {-half, half, 0.3F, buried_m}, {-half, half, 0.1F, 0.85F},
+              Surface::garden_wall, Surface::garden_wall);
+  mesh.append(barrier, Eigen::Isometry3f(Eigen::Translation3f(half, 0, 0)));
+  return mesh;
+}
+
 Mesh make_any_fence(float length_m, Random random) {
   Mesh mesh;
   const float height = random.between(0.8, random.chance(0.5) ? 2.4 : 1.6);
@@ -142,7 +143,7 @@ Mesh make_any_fence(float length_m, Random random) {
       add_railing(mesh, length_m, height, random);
       break;
     case 4:
-      add_crash_barrier(mesh, length_m, random);
+      mesh.append(make_any_crash_barrier(length_m, random), Eigen::Isometry3f::Identity());
       break;
     default:
       add_rails(mesh, length_m, height, random);

@@ -29,6 +29,13 @@ NearestStreet nearest(const std::vector<StreetPlan>& streets, double position) {
   return best;
 }
 
+// From the back of the nearest street's sidewalk into the lots.
+double behind_street_m(const std::vector<StreetPlan>& streets, double position) {
+  const NearestStreet street = nearest(streets, position);
+  if (street.profile == nullptr) return street.distance_m;
+  return street.distance_m - street.profile->half_street_m();
+}
+
 // Zone according to one street; `other` is the nearest street across it.
 Zone zone_by(const NearestStreet& street, const NearestStreet& other) {
   if (street.profile == nullptr || street.distance_m > street.profile->half_street_m()) {
@@ -89,6 +96,19 @@ Zone GroundShape::zone(const Eigen::Vector2d& spot_plan) const {
   return zone == Zone::lot ? lot_zone(plan_.patches, spot_plan) : zone;
 }
 
+bool GroundShape::is_paved_yard(const Eigen::Vector2d& spot_plan) const {
+  if (plan_.share_paved_yards == 0.0) return false;
+  constexpr double yard_m = 14.0;
+  constexpr double depth_m = 12.0;
+  const double by_u = behind_street_m(plan_.streets_along_v, spot_plan.x());
+  const double by_v = behind_street_m(plan_.streets_along_u, spot_plan.y());
+  if (std::min(by_u, by_v) > depth_m) return false;
+  const bool beside_u = by_u < by_v;
+  const double along = std::floor((beside_u ? spot_plan.y() : spot_plan.x()) / yard_m);
+  return Random(64, static_cast<std::uint64_t>(static_cast<std::int64_t>(along)), beside_u ? 1 : 0)
+      .chance(plan_.share_paved_yards);
+}
+
 double GroundShape::height(const Eigen::Vector2d& spot_plan, Zone zone) const {
   const double u = spot_plan.x();
   const double v = spot_plan.y();
@@ -100,21 +120,17 @@ double GroundShape::height(const Eigen::Vector2d& spot_plan, Zone zone) const {
   height -= 0.02 * off_centre;
   if (!is_driven(zone)) height += kerb(spot_plan);
   height += embankment(spot_plan);
-  if (zone == Zone::lot || zone == Zone::verge || zone == Zone::median) height += bump(spot_plan);
+  const bool is_rough = zone == Zone::verge || zone == Zone::median ||
+                        (zone == Zone::lot && !is_paved_yard(spot_plan));
+  if (is_rough) height += bump(spot_plan);
   return height;
 }
 
 // Slope behind the street, up or down in waves along it.
 double GroundShape::embankment(const Eigen::Vector2d& spot_plan) const {
   if (plan_.embankment_m == 0.0) return 0.0;
-  double behind_m = std::numeric_limits<double>::infinity();
-  const auto come_nearer = [&](const std::vector<StreetPlan>& streets, double position) {
-    const NearestStreet street = nearest(streets, position);
-    if (street.profile == nullptr) return;
-    behind_m = std::min(behind_m, street.distance_m - street.profile->half_street_m());
-  };
-  come_nearer(plan_.streets_along_v, spot_plan.x());
-  come_nearer(plan_.streets_along_u, spot_plan.y());
+  const double behind_m = std::min(behind_street_m(plan_.streets_along_v, spot_plan.x()),
+                                   behind_street_m(plan_.streets_along_u, spot_plan.y()));
   const double part = std::clamp(behind_m / 7.0, 0.0, 1.0);
   const double wave =
       std::sin(spot_plan.x() / 21.0 + phase_[5]) * std::sin(spot_plan.y() / 17.0 + phase_[6]);

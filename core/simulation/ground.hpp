@@ -16,6 +16,8 @@ class GroundShape {
 
   [[nodiscard]] const CityPlan& plan() const { return plan_; }
   [[nodiscard]] Zone zone(const Eigen::Vector2d& spot_plan) const;
+  /// True where a lot is paved.
+  [[nodiscard]] bool is_paved_yard(const Eigen::Vector2d& spot_plan) const;
   /// Height of the bare surface at `spot_plan` if it belongs to `zone` [m, map frame].
   [[nodiscard]] double height(const Eigen::Vector2d& spot_plan, Zone zone) const;
   /// The point of the map on the ground at `spot_plan`.

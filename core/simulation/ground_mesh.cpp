@@ -144,8 +144,10 @@ void add_ground(Mesh& mesh, const GroundShape& ground) {
       const auto corner = [&](std::size_t di, std::size_t dj) -> Eigen::Vector3f {
         return ground.on_ground({us[i + di], vs[j + dj]}, zone).cast<float>();
       };
-      mesh.add_quad(corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1), surface_of(zone, plan));
       const Eigen::Vector2d far(us[i + 1], vs[j + 1]);
+      const bool is_paved = zone == Zone::lot && ground.is_paved_yard({us[i], vs[j]});
+      mesh.add_quad(corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1),
+                    is_paved ? Surface::pavement : surface_of(zone, plan));
       if (i + 2 < us.size()) {
         add_step(mesh, ground, {far.x(), vs[j]}, far, zone, zone_of(i + 1, j));
       }

@@ -95,14 +95,14 @@ LidarFlaws random_flaws(const SensorModel& sensor, Random random) {
   flaws.blind_spots = random_blind_spots(sensor, random);
   flaws.roll = 0.7 * degree * random.normal();
   flaws.pitch = 0.7 * degree * random.normal();
-  // Sensors compress or stretch contrast; a surface of 0.25 is reported as 0.12 to 0.45. A HDL-64E
+  // Sensors compress or stretch contrast; a surface of 0.25 is reported as 0.12 to 0.5. A HDL-64E
   // as KITTI has it shows ground and walls nearly alike, and what is dark as 0.
   const bool equalised = random.chance(0.7);
   flaws.intensity_gamma = equalised ? random.uniform(0.12, 0.4) : random.uniform(0.3, 1.2);
   flaws.intensity_gain =
-      random.uniform(equalised ? 0.25 : 0.12, 0.45) / std::pow(0.25, flaws.intensity_gamma);
+      random.uniform(equalised ? 0.3 : 0.12, 0.5) / std::pow(0.25, flaws.intensity_gamma);
   flaws.intensity_floor = equalised ? random.uniform(0.0, 0.04) : 0.0;
-  flaws.intensity_offset = random.uniform(-0.1, 0.05);
+  flaws.intensity_offset = random.uniform(equalised ? -0.05 : -0.1, 0.05);
   flaws.intensity_step = random.chance(0.5) ? 0.01 : 1.0 / 255.0;
   flaws.mixed_share = random.uniform(0.0, 0.4);
   return flaws;

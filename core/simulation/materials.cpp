@@ -118,10 +118,10 @@ Materials random_materials(Random random) {
   draw_lost(materials, Surface::glass, 0.3, 0.95, random);
   draw_lost(materials, Surface::tyre, 0.0, 0.5, random);
   draw_lost(materials, Surface::fence_mesh, 0.0, 0.4, random);
-  draw_gloss(materials, Surface::paint, 8.0, random);
+  draw_gloss(materials, Surface::paint, 16.0, random);
   draw_gloss(materials, Surface::glass, 5.0, random);
   for (const Surface metal : {Surface::pole, Surface::fence_metal, Surface::sign_back})
-    draw_gloss(materials, metal, 2.0, random);
+    draw_gloss(materials, metal, 4.0, random);
   if (random.chance(0.15)) wet(materials, random);
   materials.lost_in_panes = true;
   materials.patchiness = random.uniform(0.0, 0.6);

@@ -48,11 +48,12 @@ SimulationConfig plain_sequence(std::uint64_t seed, Random& random) {
   return config;
 }
 
-StreetProfile random_profile(Random& random) {
+// Roads in the country often end in grass.
+StreetProfile random_profile(Random& random, bool is_country) {
   StreetProfile profile;
   const double size = random.uniform();
   profile.lanes = size < 0.9 ? 1 : size < 0.98 ? 2 : 3;
-  profile.half_median_m = random.chance(0.2) ? random.uniform(0.5, 3.0) : 0.0;
+  profile.half_median_m = random.chance(0.2) ? random.uniform(0.5, 5.0) : 0.0;
   profile.lane_width_m = random.uniform(2.2, 3.2);
   profile.bike_lane_m = random.chance(0.3) ? random.uniform(1.0, 1.8) : random.uniform(0.0, 0.5);
   const double parking = random.uniform();
@@ -60,14 +61,15 @@ StreetProfile random_profile(Random& random) {
   if (parking > 0.7) profile.parking_m = random.uniform(2.0, 2.6);
   if (parking > 0.87) profile.parking_m = random.uniform(4.4, 5.6);
   profile.verge_m = random.chance(0.5) ? random.uniform(0.6, 6.0) : 0.0;
-  profile.sidewalk_m =
-      random.chance(0.12) ? 0.0 : random.uniform(1.2, random.chance(0.5) ? 6.5 : 3.0);
+  profile.sidewalk_m = random.chance(is_country ? 0.6 : 0.1)
+                           ? 0.0
+                           : random.uniform(1.2, random.chance(0.5) ? 6.5 : 3.0);
   return profile;
 }
 
 // A ring of streets round one block, perhaps crossed by a side street of another kind.
-void draw_streets(CityPlan& plan, Random& random) {
-  plan.route_profile = random_profile(random);
+void draw_streets(CityPlan& plan, Random& random, bool is_country) {
+  plan.route_profile = random_profile(random, is_country);
   const double half = plan.route_profile.half_street_m();
   plan.turn_radius_m = plan.route_profile.bike_centre_m() + 3.0;
   const double min_side_m = std::max(2.0 * plan.turn_radius_m + 30.0, 2.0 * half + 30.0);
@@ -76,7 +78,7 @@ void draw_streets(CityPlan& plan, Random& random) {
   plan.streets_along_v = {{0.0, plan.route_profile}, {width, plan.route_profile}};
   plan.streets_along_u = {{0.0, plan.route_profile}, {depth, plan.route_profile}};
   plan.route = {{0, 0}, {width, 0}, {width, depth}, {0, depth}};
-  StreetProfile side = random_profile(random);
+  StreetProfile side = random_profile(random, is_country);
   side.lanes = 1;
   side.half_median_m = 0.0;
   const double middle = width * random.uniform(0.4, 0.6);
@@ -88,14 +90,15 @@ void draw_streets(CityPlan& plan, Random& random) {
   if (random.chance(0.3)) plan.crossings.emplace_back(0.0, 0.5 * depth);
 }
 
-void draw_ground(CityPlan& plan, Random& random) {
+void draw_ground(CityPlan& plan, Random& random, bool is_country) {
   plan.margin_m = random.uniform(45.0, 65.0);
   plan.bend_length_m = random.uniform(45.0, 120.0);
   plan.bend_m = random.chance(0.3) ? 0.0 : random.uniform(0.0, 0.15) * plan.bend_length_m;
   plan.hill_length_m = random.uniform(40.0, 100.0);
   plan.hill_m = random.chance(0.3) ? 0.1 : random.uniform(0.0, 0.05) * plan.hill_length_m;
-  plan.kerb_m = random.chance(0.15) ? 0.0 : random.uniform(0.02, 0.2);
+  plan.kerb_m = random.chance(is_country ? 0.6 : 0.1) ? 0.0 : random.uniform(0.02, 0.2);
   plan.share_driveways = random.chance(0.6) ? random.uniform(0.1, 0.8) : 0.0;
+  plan.share_paved_yards = is_country || random.chance(0.4) ? 0.0 : random.uniform();
   plan.embankment_m = random.chance(0.5) ? random.uniform(0.3, 3.5) : 0.0;
   plan.tufts_m = random.uniform(0.0, 0.08);
   plan.paved_medians = random.chance(0.2);
@@ -120,11 +123,18 @@ void draw_patches(CityPlan& plan, Random& random) {
   }
 }
 
-void draw_blocks(CityPlan& plan, Random& random) {
+// Houses stand at the sidewalk in the middle of a town, behind gardens in its suburbs; roads in the
+// country show few or none.
+void draw_blocks(CityPlan& plan, Random& random, bool is_country) {
   BlockPlan& blocks = plan.blocks;
-  const bool suburb = random.chance(0.6);
+  const bool suburb = random.chance(0.5);
+  const bool at_sidewalk = !suburb && random.chance(0.6);
   blocks.setback_min_m = suburb ? random.uniform(1.0, 6.0) : random.uniform(0.0, 2.0);
   blocks.setback_max_m = blocks.setback_min_m + random.uniform(0.5, suburb ? 12.0 : 3.0);
+  if (at_sidewalk) {
+    blocks.setback_min_m = 0.0;
+    blocks.setback_max_m = random.uniform(0.0, 0.3);
+  }
   blocks.gap_max_m = suburb ? random.uniform(2.0, 18.0) : random.uniform(0.0, 4.0);
   blocks.floors_min = 1 + static_cast<int>(random.index(2));
   blocks.floors_max = blocks.floors_min + static_cast<int>(random.index(suburb ? 3 : 5));
@@ -135,10 +145,15 @@ void draw_blocks(CityPlan& plan, Random& random) {
   blocks.share_thicket = random.uniform(0.0, 0.95 - blocks.share_fence - blocks.share_hedge);
   blocks.share_wall = 0.95 - blocks.share_fence - blocks.share_hedge - blocks.share_thicket;
   if (random.chance(0.5)) blocks.share_wall *= random.uniform();
-  // Roads through fields and woods show few houses or none.
-  const double houses = random.chance(0.3) ? random.uniform(0.0, 0.5) : random.uniform(0.5, 1.0);
+  if (at_sidewalk) {
+    for (double* share : {&blocks.share_fence, &blocks.share_hedge, &blocks.share_thicket,
+                          &blocks.share_wall, &blocks.garden_trees_per_100m})
+      *share *= 0.2;
+  }
+  const double houses = is_country ? random.uniform(0.0, 0.5) : random.uniform(0.5, 1.0);
   blocks.share_open = (1.0 - houses) * random.uniform();
   blocks.share_wood = 1.0 - houses - blocks.share_open;
+  blocks.share_barrier = random.uniform(0.0, 0.6);
   blocks.share_halls = random.chance(0.3) ? houses * random.uniform(0.0, 0.4) : 0.0;
 }
 
@@ -169,10 +184,11 @@ CityPlan training_plan(Random random) {
   CityPlan plan;
   plan.name = "training";
   plan.many_shapes = true;
-  draw_streets(plan, random);
-  draw_ground(plan, random);
+  const bool is_country = random.chance(0.3);
+  draw_streets(plan, random, is_country);
+  draw_ground(plan, random, is_country);
   draw_patches(plan, random);
-  draw_blocks(plan, random);
+  draw_blocks(plan, random, is_country);
   draw_traffic(plan, random);
   plan.ego_lane =
       static_cast<int>(random.index(static_cast<std::size_t>(plan.route_profile.lanes)));
@@ -196,6 +212,13 @@ SimulationConfig training_sequence(std::uint64_t seed, double share_of_plain) {
   config.noise = random_noise(random);
   config.flaws = random_flaws(config.sensor, Random(seed, 93));
   config.materials = random_materials(Random(seed, 94));
+  return config;
+}
+
+SimulationConfig any_sequence(std::uint64_t seed, const SensorModel& sensor) {
+  SimulationConfig config = training_sequence(seed, 0.0);
+  config.sensor = sensor;
+  config.flaws = random_flaws(sensor, Random(seed, 93));
   return config;
 }
 

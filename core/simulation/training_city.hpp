@@ -13,6 +13,10 @@ namespace stillmap::simulation {
 /// sequence.
 [[nodiscard]] SimulationConfig training_sequence(std::uint64_t seed, double share_of_plain = 0.4);
 
+/// The same city, materials and noise as those of a sequence for training that is not plain, seen
+/// by that lidar, with its flaws.
+[[nodiscard]] SimulationConfig any_sequence(std::uint64_t seed, const SensorModel& sensor);
+
 /// Up to `count` scans of the sequence, spread over the route and at least 8 m apart.
 [[nodiscard]] std::vector<int> spread_scans(const Simulation& sequence, int count);
 

@@ -35,6 +35,13 @@ TEST_F(SimulateCommandTest, IsTheSameForTheSameSeedOnly) {
   EXPECT_NE(content("a/velodyne/000000.bin"), content("c/velodyne/000000.bin"));
 }
 
+TEST_F(SimulateCommandTest, DrawsAnyCityAndTheFlawsOfItsLidar) {
+  const std::string any = " --preset any --seed 608 --scans 1 --sensor ";
+  ASSERT_EQ(run("simulate " + path("vlp") + any + "vlp16").exit_code, 0);
+  EXPECT_THAT(run("evaluate drives sim:any,seed=608,sensor=vlp_16,scans=3,traffic=0").out,
+              HasSubstr("sim:any,seed=608"));
+}
+
 TEST_F(SimulateCommandTest, PrintsJsonWhenAsked) {
   const ProcessResult result = run("simulate " + path("city") +
                                    " --preset yard --sensor vlp16 --scans 1 --traffic 0 --json");
@@ -60,6 +67,7 @@ TEST_F(SimulateCommandTest, RefusesWhatItDoesNotKnow) {
   const ProcessResult preset = run(out + " --preset moon");
   EXPECT_EQ(preset.exit_code, 2);
   EXPECT_THAT(preset.err, HasSubstr("moon"));
+  EXPECT_THAT(preset.err, HasSubstr("'any'"));
   const ProcessResult sensor = run(out + " --sensor hdl_65");
   EXPECT_EQ(sensor.exit_code, 2);
   EXPECT_THAT(sensor.err, HasSubstr("hdl_65"));

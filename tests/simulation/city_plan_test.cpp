@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+
 #include "core/simulation/city.hpp"
 
 namespace stillmap::simulation {
@@ -72,6 +74,32 @@ TEST_F(Ground, JunctionIsRoadAndHasNoParking) {
   EXPECT_EQ(ground_.zone(
                 {plan_.route_profile.half_road_m() + 3.0, plan_.route_profile.half_road_m() - 0.5}),
             Zone::road);
+}
+
+TEST_F(Ground, YardsArePavedAsFarAsThePlanSays) {
+  const double back = plan_.route_profile.half_street_m();
+  const Eigen::Vector2d near(30.0, back + 3.0), far(30.0, back + 13.0);
+  EXPECT_FALSE(ground_.is_paved_yard(near));
+  plan_.share_paved_yards = 1.0;
+  const GroundShape paved(plan_, 3);
+  ASSERT_EQ(paved.zone(near), Zone::lot);
+  EXPECT_TRUE(paved.is_paved_yard(near));
+  EXPECT_FALSE(paved.is_paved_yard(far));
+  const auto slabs = [](const GroundShape& ground) {
+    Mesh mesh;
+    add_ground(mesh, ground);
+    return std::ranges::count(mesh.surfaces, Surface::pavement);
+  };
+  EXPECT_GT(slabs(paved), slabs(ground_) + 100);
+}
+
+TEST_F(Ground, CrashBarriersStandAlongOpenLand) {
+  plan_.many_shapes = true;
+  plan_.blocks.share_open = 1.0;
+  plan_.blocks.share_fence = plan_.blocks.share_hedge = plan_.blocks.share_wall = 0.0;
+  const std::size_t without = build_city(GroundShape(plan_, 3), 5, 5).bodies.size();
+  plan_.blocks.share_barrier = 1.0;
+  EXPECT_GT(build_city(GroundShape(plan_, 3), 5, 5).bodies.size(), without + 20);
 }
 
 TEST_F(Ground, FramesStandUprightOrLeanALittle) {

@@ -32,6 +32,7 @@ std::vector<Kind> kinds() {
           {"thicket", [](Random r) { return make_any_thicket(3.0F, r); }, 3.5F, 1.4F, 7.5F},
           {"bank", [](Random r) { return make_any_bank(3.0F, r); }, 15.5F, 0.7F, 6.5F},
           {"fence", [](Random r) { return make_any_fence(3.0F, r); }, 3.5F, 0.5F, 2.8F},
+          {"barrier", [](Random r) { return make_any_crash_barrier(3.0F, r); }, 3.5F, 0.6F, 0.9F},
           {"wall", [](Random r) { return make_any_wall(3.0F, r); }, 3.5F, 0.35F, 3.5F},
           {"light", make_any_street_light, 4.0F, 2.9F, 10.5F},
           {"pole", make_any_pole, 0.2F, 0.5F, 9.1F},

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
@@ -28,6 +29,7 @@ TEST(TrainingPlan, VariesEverything) {
   std::set<int> lanes;
   std::map<std::string, int> sensors;
   int without_sidewalk = 0, without_kerb = 0, sloped = 0, with_car_park = 0, without_houses = 0;
+  int at_sidewalk = 0, paved_yards = 0;
   constexpr int sequences = 600;
   for (std::uint64_t seed = 0; seed < sequences; ++seed) {
     const SimulationConfig sequence = training_sequence(seed);
@@ -39,6 +41,8 @@ TEST(TrainingPlan, VariesEverything) {
     with_car_park += sequence.plan.patches.empty() ? 0 : 1;
     const BlockPlan& blocks = sequence.plan.blocks;
     without_houses += blocks.share_open + blocks.share_wood > 0.6 ? 1 : 0;
+    at_sidewalk += blocks.setback_max_m < 0.4 ? 1 : 0;
+    paved_yards += sequence.plan.share_paved_yards > 0.3 ? 1 : 0;
     EXPECT_LE(blocks.share_fence + blocks.share_hedge + blocks.share_wall + blocks.share_thicket,
               1.0);
     EXPECT_LE(blocks.share_open + blocks.share_wood + blocks.share_halls, 1.0 + 1e-9);
@@ -48,7 +52,8 @@ TEST(TrainingPlan, VariesEverything) {
   EXPECT_NEAR(sensors["VLP-16"], 0.2 * sequences, 0.06 * sequences);
   EXPECT_NEAR(sensors["HDL-32E"], 0.1 * sequences, 0.05 * sequences);
   EXPECT_EQ(sensors.size(), 4U);
-  for (const int count : {without_sidewalk, without_kerb, sloped, with_car_park, without_houses}) {
+  for (const int count : {without_sidewalk, without_kerb, sloped, with_car_park, without_houses,
+                          at_sidewalk, paved_yards}) {
     EXPECT_GT(count, sequences / 20);
     EXPECT_LT(count, sequences);
   }
@@ -77,6 +82,18 @@ TEST(TrainingSequence, ScansAreFarApartAndAsManyAsWanted) {
       EXPECT_GT(step.norm(), 4.0) << seed;
     }
   }
+}
+
+TEST(AnySequence, IsThatOfTheSeedWhateverTheLidar) {
+  const SimulationConfig of_64 = any_sequence(608, hdl_64e());
+  const SimulationConfig of_16 = any_sequence(608, vlp_16());
+  EXPECT_EQ(of_64.faults(), "");
+  EXPECT_EQ(of_16.faults(), "");
+  EXPECT_EQ(of_16.sensor.rings, 16);
+  EXPECT_EQ(of_16.flaws.beams.size(), 16U);
+  EXPECT_EQ(of_64.lidar_height_m, of_16.lidar_height_m);
+  EXPECT_EQ(of_64.plan.route, of_16.plan.route);
+  EXPECT_NE(of_64.plan.route, any_sequence(609, hdl_64e()).plan.route);
 }
 
 /// Some scans of several cities.

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "config/loaders/sensor_file.hpp"
+#include "core/simulation/training_city.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -29,17 +30,30 @@ std::optional<double> number_in(const std::string& text) {
   return std::nullopt;
 }
 
-simulation::CityPlan plan_of(const SimulationArguments& arguments) {
-  if (arguments.traffic.empty()) return simulation::city_plan(arguments.preset);
-  const std::optional<double> factor = number_in(arguments.traffic);
-  if (!factor) return simulation::city_plan(arguments.traffic);
+// Not a plan of its own: city, materials and the lidar's flaws are drawn from the seed.
+constexpr const char* any_preset = "any";
+
+simulation::CityPlan plan_of(const std::string& preset) {
+  try {
+    return simulation::city_plan(preset);
+  } catch (const std::invalid_argument& unknown) {
+    throw std::invalid_argument(std::string(unknown.what()) + " '" + any_preset +
+                                "' draws one by the seed.");
+  }
+}
+
+void change_traffic(const std::string& traffic, simulation::CityPlan& plan) {
+  if (traffic.empty()) return;
+  const std::optional<double> factor = number_in(traffic);
+  if (!factor) {
+    plan = simulation::city_plan(traffic);
+    return;
+  }
   if (!(*factor >= 0.0 && *factor <= 10.0)) {
-    throw std::invalid_argument("traffic '" + arguments.traffic +
+    throw std::invalid_argument("traffic '" + traffic +
                                 "' is not a factor from 0 to 10 or the name of a preset");
   }
-  simulation::CityPlan plan = simulation::city_plan(arguments.preset);
   scale(plan.traffic, *factor);
-  return plan;
 }
 
 // hdl64 and vlp16 are what people type.
@@ -63,11 +77,16 @@ void check_seed(const std::string& option, std::uint64_t seed) {
 simulation::SimulationConfig simulation_config(const SimulationArguments& arguments) {
   check_seed("--seed", arguments.seed);
   check_seed("--day", arguments.day);
+  const SensorModel sensor = load_sensor(sensor_name(arguments.sensor));
   simulation::SimulationConfig config;
-  config.plan = plan_of(arguments);
+  if (arguments.preset == any_preset)
+    config = simulation::any_sequence(arguments.seed, sensor);
+  else
+    config.plan = plan_of(arguments.preset);
+  change_traffic(arguments.traffic, config.plan);
   config.seed = arguments.seed;
   config.day = arguments.day;
-  config.sensor = load_sensor(sensor_name(arguments.sensor));
+  config.sensor = sensor;
   config.scans = arguments.scans;
   config.rolling = arguments.rolling;
   config.motion = simulation::lidar_motion(arguments.motion);

@@ -273,7 +273,8 @@ void add_evaluate_drives_command(CommandHandle evaluate, Action& action) {
       "drives", "Odometry on many drives: errors, health, sharpness of the map, time");
   command
       .option("DRIVES", arguments->drives,
-              "Sequences, or sim:PRESET[,seed=N][,scans=N][,sensor=S][,motion=M][,traffic=T]"
+              "Sequences, or sim:PRESET (quiet, crowd, yard, circuit, "
+              "any)[,seed=N][,scans=N][,sensor=S][,motion=M][,traffic=T]"
               "[,rolling][,imu]")
       .required();
   command

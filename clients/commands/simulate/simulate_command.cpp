@@ -92,8 +92,9 @@ void add_simulate_command(CommandHandle program, Action& action) {
   command.option("OUT", arguments->out, "New folder for the sequence").required();
   command
       .option("--preset", simulation.preset,
-              "City: quiet, crowd, yard (one small block) or circuit (a route that comes back to "
-              "every street, in both directions)")
+              "City: quiet, crowd, yard (one small block), circuit (a route that comes back to "
+              "every street, in both directions) or any (streets, houses, plants, traffic, "
+              "materials and the lidar's flaws drawn by the seed, as for training)")
       .with_default();
   command.option("--traffic", simulation.traffic,
                  "Factor on everything that moves (0: an empty city), or a preset's name");
