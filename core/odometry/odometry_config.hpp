@@ -72,7 +72,7 @@ struct RegistrationConfig {
   double max_neighbour_distance_m = 1.0;
   /// Correspondences with a larger residual are discarded [m]; the paper's [0, 1].
   double max_residual_m = 1.0;
-  int max_iterations = 20;
+  int max_iterations = 80;
   /// Converged when a step is below both.
   double step_translation_m = 0.001;
   double step_rotation_rad = 0.0001;

@@ -165,7 +165,8 @@ Path route_path(const GroundShape& ground, bool reversed, double offset_m,
     const double to_left = cross(in, out);
     const double radius = turn_radius_m.value_or(ground.plan().turn_radius_m + to_left * offset_m);
     const Vector2d centre = corner - radius * in + radius * out;
-    constexpr int pieces = 24;
+    // Plain cities keep the coarse turns that figures were measured in: 3.75 degrees at a time.
+    const int pieces = ground.plan().many_shapes ? 240 : 24;
     for (int k = 0; k <= pieces; ++k) {
       const double turn = 0.5 * std::numbers::pi * k / pieces;
       points.push_back(centre + radius * (std::sin(turn) * in - std::cos(turn) * out));
