@@ -261,8 +261,8 @@ VoxelHistory LiveTile::history(const LiveVoxel& voxel) {
 }
 
 std::uint32_t LiveTile::trust_in(const LiveVoxel& voxel, const VisibilityRule& rule) {
-  const bool has_class = voxel.packed.evidence.winner() != SemanticClass::unlabeled;
-  return has_class ? rule.label_trust : 1;
+  const bool is_sure = voxel.packed.evidence.is_sure(voxel.packed.point_count);
+  return is_sure ? rule.label_trust : 1;
 }
 
 bool LiveTile::is_seen_through(const LiveVoxel& voxel, const VisibilityRule& rule) {

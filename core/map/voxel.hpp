@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <compare>
 #include <cstddef>
@@ -46,6 +47,16 @@ class ClassEvidence {
     const std::uint32_t all = total();
     return all == 0 ? 0.0F
                     : static_cast<float>(bits_.weights[strongest()]) / static_cast<float>(all);
+  }
+
+  /// Whether there is a winner, and with a mean confidence of 0.7 over the voxel's points.
+  [[nodiscard]] bool is_sure(std::uint32_t points) const {
+    constexpr float sure_confidence = 0.7F;
+    // Of more points votes are scaled down.
+    constexpr float max_points = 0.75F * max_total;
+    const float weight = static_cast<float>(bits_.weights[strongest()]) * weight_step;
+    return weight > 0.0F &&
+           weight >= sure_confidence * std::min(static_cast<float>(points), max_points);
   }
 
   struct Vote {
