@@ -91,12 +91,17 @@ void straighten_first_scan(const FirstScan& first, const FeatureSets& features, 
   constexpr int more_rounds = 4;
   LocalMap empty_map = map;
   empty_map.clear();
+  // A motion that is far off would take many steps to nowhere.
+  constexpr int rough_iterations = 20;
+  OdometryConfig rough = config;
+  rough.registration.max_iterations = std::min(rough.registration.max_iterations, rough_iterations);
+  const TwoScans roughly{first, features, interval_s, sweep, rough, empty_map};
   const TwoScans scans{first, features, interval_s, sweep, config, empty_map};
   const std::vector<Eigen::Isometry3d> motions =
       possible_motions(last.T_map_lidar.inverse() * second.T_map_lidar, interval_s, max_speed_m_s);
   std::vector<std::optional<Straightened>> found(motions.size());
   tbb::parallel_for(std::size_t{0}, motions.size(), [&](std::size_t i) {
-    found[i] = straightened(scans, motions[i], first_rounds);
+    found[i] = straightened(roughly, motions[i], first_rounds);
   });
   const std::optional<Straightened>* best = found.data();
   for (const std::optional<Straightened>& candidate : found) {
