@@ -91,11 +91,12 @@ void straighten_first_scan(const FirstScan& first, const FeatureSets& features, 
   constexpr int more_rounds = 4;
   LocalMap empty_map = map;
   empty_map.clear();
-  // A motion that is far off would take many steps to nowhere.
+  // Enough to tell the motions apart: one that is far off would take many steps to nowhere.
   constexpr int rough_iterations = 20;
   OdometryConfig rough = config;
   rough.registration.max_iterations = std::min(rough.registration.max_iterations, rough_iterations);
-  const TwoScans roughly{first, features, interval_s, sweep, rough, empty_map};
+  const FeatureSets some = downsampled(features);
+  const TwoScans roughly{first, some, interval_s, sweep, rough, empty_map};
   const TwoScans scans{first, features, interval_s, sweep, config, empty_map};
   const std::vector<Eigen::Isometry3d> motions =
       possible_motions(last.T_map_lidar.inverse() * second.T_map_lidar, interval_s, max_speed_m_s);
