@@ -106,7 +106,8 @@ void straighten_first_scan(const FirstScan& first, const FeatureSets& features, 
   });
   const std::optional<Straightened>* best = found.data();
   for (const std::optional<Straightened>& candidate : found) {
-    const bool is_better = candidate && (!*best || fits_better(candidate->second, (*best)->second));
+    const OdometryResult& to_beat = *best ? (*best)->second : second;
+    const bool is_better = candidate && fits_better(candidate->second, to_beat);
     if (is_better) best = &candidate;
   }
   if (!*best) return;
