@@ -34,8 +34,11 @@ void read_channel(YamlSection section, InputStatistics& statistics, std::size_t 
 }
 
 void read_statistics(YamlSection section, InputStatistics& statistics) {
-  const std::vector<std::string> channels{"range", "x", "y", "z", "remission"};
+  std::vector<std::string> channels{"range", "x", "y", "z", "remission"};
   section.require(channels);
+  // Channels beyond RangeNet++'s.
+  if (section.has("slope")) channels.emplace_back("slope");
+  statistics.channels = channels.size();
   for (std::size_t i = 0; i < channels.size(); ++i) {
     read_channel(section.section(channels[i]), statistics, i);
   }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -15,17 +16,33 @@
 
 namespace stillmap {
 
-/// Channels of the network's input, in this order: range, x, y, z [m], remission (0..1).
-inline constexpr std::size_t input_channels = 5;
+/// Channels of a network's input, in this order.
+enum class InputChannel : std::uint8_t {
+  range,  ///< [m]
+  x,      ///< [m], as y and z in the lidar's frame
+  y,
+  z,
+  remission,  ///< 0..1
+  slope,      ///< [rad]; see surface_slope_rad()
+};
+inline constexpr std::size_t max_input_channels = 6;
+/// RangeNet++'s: without the slope.
+inline constexpr std::size_t plain_input_channels = 5;
+
+[[nodiscard]] constexpr std::size_t index(InputChannel channel) {
+  return static_cast<std::size_t>(channel);
+}
 
 /// Widths of range images that a user can choose; a model's own may be smaller.
 inline constexpr int min_image_columns = 16;
 inline constexpr int max_image_columns = 8192;
 
-/// Mean and standard deviation of each input channel over the training set.
+/// The channels that a network takes, the first so many, and mean and standard deviation of each
+/// over the training set.
 struct InputStatistics {
-  std::array<float, input_channels> mean{};
-  std::array<float, input_channels> deviation{};
+  std::size_t channels = plain_input_channels;
+  std::array<float, max_input_channels> mean{};
+  std::array<float, max_input_channels> deviation{};
 };
 
 /// Lidars whose scans a model has seen, or ones between them. Angles in radians.
@@ -72,6 +89,10 @@ struct ModelDescription {
   /// Without it the network cannot run in 8-bit integers.
   std::optional<Int8Calibration> int8;
 
+  /// Values of one input: channels x rows x columns.
+  [[nodiscard]] std::size_t input_size() const {
+    return statistics.channels * static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
+  }
   [[nodiscard]] ProjectionModel projection() const {
     return {.rows = rows, .columns = columns, .fov_up = fov_up, .fov_down = fov_down};
   }

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/segmentation/model_error.hpp"
+#include "core/segmentation/surface_slope.hpp"
 
 namespace stillmap {
 namespace {
@@ -31,7 +32,8 @@ float remission_factor(std::span<const float> intensity, const InputStatistics& 
   const float dark = at_share(10), bright = at_share(90);
   if (bright <= dark || bright <= 0.0F) return 0.0F;
   // The same share of a normal distribution.
-  const float usual = statistics.mean.back() + 1.28F * statistics.deviation.back();
+  constexpr std::size_t remission = index(InputChannel::remission);
+  const float usual = statistics.mean[remission] + 1.28F * statistics.deviation[remission];
   const bool is_usual = bright < usual * usual_factor && bright > usual / usual_factor;
   return is_usual || usual <= 0.0F ? 1.0F : usual / bright;
 }
@@ -46,16 +48,24 @@ std::vector<float> make_network_input(const Scan& scan, const RangeImage& image,
   const InputStatistics& statistics = model.statistics;
   const float factor = remission_factor(scan.intensity, statistics);
   const bool has_remission = !scan.intensity.empty() && factor > 0.0F;
-  std::vector<float> input(input_channels * pixels, 0.0F);
+  const bool has_slope = statistics.channels > index(InputChannel::slope);
+  const std::vector<float> slope_rad =
+      has_slope ? surface_slope_rad(image, scan.points_lidar) : std::vector<float>();
+  std::vector<float> input(statistics.channels * pixels, 0.0F);
   for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
     const std::int32_t nearest = image.nearest()[pixel];
     if (nearest == RangeImage::none || (model.mask_first_point && nearest == 0)) continue;
     const auto point = static_cast<std::size_t>(nearest);
     const Eigen::Vector3f& p_lidar = scan.points_lidar[point];
-    const float remission = has_remission ? factor * scan.intensity[point] : statistics.mean.back();
-    const std::array<float, input_channels> values{image.range_m()[pixel], p_lidar.x(), p_lidar.y(),
-                                                   p_lidar.z(), remission};
-    for (std::size_t c = 0; c < input_channels; ++c) {
+    const float remission = has_remission ? factor * scan.intensity[point]
+                                          : statistics.mean[index(InputChannel::remission)];
+    const std::array<float, max_input_channels> values{image.range_m()[pixel],
+                                                       p_lidar.x(),
+                                                       p_lidar.y(),
+                                                       p_lidar.z(),
+                                                       remission,
+                                                       has_slope ? slope_rad[pixel] : 0.0F};
+    for (std::size_t c = 0; c < statistics.channels; ++c) {
       const float normalised = (values[c] - statistics.mean[c]) / statistics.deviation[c];
       // Only remission can be NaN here; convolutions would spread it to the surroundings.
       if (std::isfinite(normalised)) input[c * pixels + pixel] = normalised;
@@ -65,8 +75,7 @@ std::vector<float> make_network_input(const Scan& scan, const RangeImage& image,
 }
 
 std::vector<float> trial_input(const ModelDescription& model) {
-  std::vector<float> input(input_channels * static_cast<std::size_t>(model.rows) *
-                           static_cast<std::size_t>(model.columns));
+  std::vector<float> input(model.input_size());
   for (std::size_t i = 0; i < input.size(); ++i)
     input[i] = std::sin(0.37F * static_cast<float>(i % 9973));
   return input;

@@ -9,10 +9,11 @@
 
 namespace stillmap {
 
-/// The network's input, 5 x rows x columns: range, x, y, z, remission of each pixel's nearest point
-/// as (value - mean) / deviation; all 0 in an empty pixel. Without intensity, or with one that is
-/// the same everywhere, the remission is 0, the mean. An intensity whose 90th percentile is beyond
-/// a factor of 3 of the training set's is scaled to it. `image` is the scan's.
+/// The network's input, channels x rows x columns: range, x, y, z, remission of each pixel's
+/// nearest point and, for models that take it, the slope of the surface there, as (value - mean) /
+/// deviation; all 0 in an empty pixel. Without intensity, or with one that is the same everywhere,
+/// the remission is 0, the mean. An intensity whose 90th percentile is beyond a factor of 3 of the
+/// training set's is scaled to it. `image` is the scan's.
 [[nodiscard]] std::vector<float> make_network_input(const Scan& scan, const RangeImage& image,
                                                     const ModelDescription& model);
 

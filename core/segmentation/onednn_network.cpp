@@ -45,7 +45,7 @@ std::unique_ptr<CompiledPlan> compile(Precision precision, NetworkGraph& graph,
 PreparedNetwork load(const ModelDescription& model) {
   require_valid(model);
   const OnnxFile file(model.network_file);
-  require_input_shape(file, static_cast<int>(input_channels), model.rows, model.columns);
+  require_input_shape(file, static_cast<int>(model.statistics.channels), model.rows, model.columns);
   return prepare_network(file, model);
 }
 

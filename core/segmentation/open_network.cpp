@@ -61,7 +61,7 @@ namespace {
 std::size_t count_outputs(const OnnxFile& file, const ModelDescription& model) {
   try {
     NetworkGraph graph = read_network(file);
-    infer_shapes(graph, {.channels = static_cast<int>(input_channels),
+    infer_shapes(graph, {.channels = static_cast<int>(model.statistics.channels),
                          .rows = model.rows,
                          .columns = model.columns});
     return static_cast<std::size_t>(graph.tensors[graph.output].shape.channels);

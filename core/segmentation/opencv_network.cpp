@@ -93,7 +93,7 @@ void OpenCvNetwork::State::require_output_shape(const cv::Mat& output, const fs:
 
 OpenCvNetwork::OpenCvNetwork(const ModelDescription& model) : state_(std::make_unique<State>()) {
   require_valid(model);
-  constexpr auto channels = static_cast<int>(input_channels);
+  const auto channels = static_cast<int>(model.statistics.channels);
   // OpenCV checks neither the file's consistency nor its declared input shape.
   require_input_shape(OnnxFile(model.network_file), channels, model.rows, model.columns);
   state_->net = read_with_opencv(model.network_file);
@@ -105,8 +105,8 @@ OpenCvNetwork::OpenCvNetwork(const ModelDescription& model) : state_(std::make_u
 OpenCvNetwork::~OpenCvNetwork() = default;
 
 PixelOutputs OpenCvNetwork::run(std::span<const float> input) {
-  assert(input.size() == input_channels * static_cast<std::size_t>(state_->input_shape[2] *
-                                                                   state_->input_shape[3]));
+  assert(input.size() == static_cast<std::size_t>(state_->input_shape[1] * state_->input_shape[2] *
+                                                  state_->input_shape[3]));
   const cv::Mat output = state_->forward(input);
   return argmax_outputs(state_->scores(output), static_cast<std::size_t>(state_->output_shape[1]),
                         state_->kind);

@@ -59,6 +59,18 @@ TEST(ModelFile, ReadsADescriptionThatCanBeUsed) {
   EXPECT_EQ(model.network_file, test::test_folder() / "model.onnx");
 }
 
+TEST(ModelFile, ReadsWhetherTheNetworkTakesTheSlope) {
+  EXPECT_EQ(load_model(sound).statistics.channels, 5U);
+  std::string yaml = sound;
+  yaml.insert(yaml.find("classes:"), "  slope: {mean: 0.53, deviation: 0.86}\n");
+  const ModelDescription model = load_model(yaml);
+  EXPECT_EQ(model.statistics.channels, 6U);
+  EXPECT_FLOAT_EQ(model.statistics.mean[5], 0.53F);
+  EXPECT_FLOAT_EQ(model.statistics.deviation[5], 0.86F);
+  EXPECT_THAT(refusal_of(yaml, "deviation: 0.86}\nclasses", "deviation: 0}\nclasses"),
+              HasSubstr("statistics.slope.deviation"));
+}
+
 TEST(ModelFile, ReadsItsCalibrationAndWhetherItFollowsTheSensor) {
   // Of a run before.
   std::filesystem::remove(test::test_folder() / "int8.yaml");

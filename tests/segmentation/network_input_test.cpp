@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
+#include "core/segmentation/surface_slope.hpp"
 #include "tests/segmentation/sample_model.hpp"
 
 namespace stillmap {
@@ -45,6 +47,25 @@ TEST(NetworkInput, IsTheNormalisedNearestPointAndZeroWhereNoneIs) {
     }
   }
   EXPECT_GT(empty, 0);
+}
+
+TEST(NetworkInput, HasTheSlopeOfTheSurfaceForModelsThatTakeIt) {
+  const Scan scan = random_scan(200, 1);
+  const RangeImage image = project(scan, model);
+  ModelDescription sloping = model;
+  sloping.statistics.channels = 6;
+  sloping.statistics.mean[5] = 0.5F;
+  sloping.statistics.deviation[5] = 0.8F;
+  const std::vector<float> plain = make_network_input(scan, image, model);
+  const std::vector<float> input = make_network_input(scan, image, sloping);
+  ASSERT_EQ(input.size(), 6 * pixels);
+  EXPECT_TRUE(std::ranges::equal(std::span(input).first(5 * pixels), plain));
+  const std::vector<float> slope_rad = surface_slope_rad(image, scan.points_lidar);
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+    const bool is_empty = image.nearest()[pixel] == RangeImage::none;
+    EXPECT_NEAR(input[5 * pixels + pixel], is_empty ? 0.0F : (slope_rad[pixel] - 0.5F) / 0.8F,
+                1e-5F);
+  }
 }
 
 TEST(NetworkInput, MasksTheFirstPointOnlyOnRequest) {

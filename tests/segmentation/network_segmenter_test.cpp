@@ -127,7 +127,7 @@ class HalfBlind final : public SegmentationNetwork {
  public:
   PixelOutputs run(std::span<const float> input) override {
     PixelOutputs outputs;
-    for (std::size_t i = 0; i < input.size() / input_channels; ++i) {
+    for (std::size_t i = 0; i < input.size() / plain_input_channels; ++i) {
       outputs.output.push_back(i % 2 == 0 ? PixelOutputs::no_output : 9);
       outputs.confidence.push_back(i % 2 == 0 ? 0.0F : 1.0F);
     }
@@ -142,7 +142,7 @@ class OneClass final : public SegmentationNetwork {
  public:
   OneClass(std::size_t pixels, std::uint8_t output) : pixels_(pixels), output_(output) {}
   PixelOutputs run(std::span<const float> input) override {
-    EXPECT_EQ(input.size(), pixels_ * input_channels);
+    EXPECT_EQ(input.size(), pixels_ * plain_input_channels);
     return {.output = std::vector(pixels_, output_), .confidence = std::vector(pixels_, 1.0F)};
   }
   std::vector<float> probabilities(std::span<const float> /*input*/) override { return {}; }

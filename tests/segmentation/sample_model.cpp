@@ -48,7 +48,7 @@ std::vector<float> random_image(const ModelDescription& model, unsigned seed) {
   std::normal_distribution<float> any(0.0F, 1.0F);
   const auto pixels =
       static_cast<std::size_t>(model.rows) * static_cast<std::size_t>(model.columns);
-  std::vector<float> image(input_channels * pixels);
+  std::vector<float> image(model.input_size());
   for (float& value : image) value = any(random);
   for (std::size_t i = 0; i < image.size(); ++i) {
     if (i % pixels % 7 == 3) image[i] = 0.0F;

@@ -16,7 +16,7 @@ import yaml
 from augmentation import aim, augment_points, crop, draw_motion, drop_beams, in_sector
 from export import trained_for
 from losses import class_weights, lovasz_softmax, weighted_cross_entropy
-from range_images import ImageModel, normalise, project
+from range_images import ImageModel, normalise, project, slope_rad
 from networks import make_network
 from samples import TrainingSamples
 from scans import ScanFiles
@@ -89,6 +89,40 @@ class Projection(unittest.TestCase):
         channels = normalise(image, [1, 2, 3, 4, 5], [2, 2, 2, 2, 2])
         self.assertEqual(np.count_nonzero(channels[0]), 1)
         self.assertEqual(channels[0].max(), 2)
+
+
+class Slope(unittest.TestCase):
+    model = ImageModel(rows=8, columns=8, fov_up_deg=10, fov_down_deg=-30)
+
+    def slopes(self, points):
+        image = project(points, np.zeros(len(points), np.float32), self.model)
+        seen = image.point >= 0
+        return slope_rad(image.channels, seen), seen
+
+    def test_is_zero_on_level_ground_and_a_right_angle_on_a_wall(self):
+        up = np.radians(np.arange(-27.5, -5, 5))
+        ground = np.stack([-1.8 / np.tan(up), 0.1 + 0 * up, np.full(up.size, -1.8)], 1)
+        wall = np.stack([np.full(up.size, -6.0), 0.1 + 0 * up, 6 * np.tan(up)], 1)
+        slope, seen = self.slopes(np.concatenate([ground, wall]).astype(np.float32))
+        self.assertEqual(seen.sum(), 10)
+        np.testing.assert_allclose(slope[:, :2].max(), np.pi / 2, atol=1e-4)
+        np.testing.assert_allclose(slope[seen], np.where(np.nonzero(seen)[1] < 2, np.pi / 2, 0), atol=1e-4)
+
+    def test_looks_across_two_empty_rows_but_no_further(self):
+        up = np.radians([7.5, -7.5, -27.5])
+        slope, seen = self.slopes(np.stack([6 + 0 * up, 0 * up - 0.1, 6 * np.tan(up)], 1).astype(np.float32))
+        self.assertEqual((np.abs(slope[seen]) > 0.1).tolist(), [True, True, False])
+        self.assertEqual(slope[~seen].tolist(), [0] * 61)
+
+    def test_is_the_sixth_channel_where_the_network_takes_it(self):
+        points = np.array([[5, 0, 0], [5, 0, 0.5]], np.float32)
+        image = project(points, np.ones(2, np.float32), self.model)
+        plain = normalise(image, [1, 2, 3, 4, 5], [2, 2, 2, 2, 2])
+        channels = normalise(image, [1, 2, 3, 4, 5, 0.5], [2, 2, 2, 2, 2, 0.5])
+        np.testing.assert_array_equal(channels[:5], plain)
+        seen = image.point >= 0
+        np.testing.assert_allclose(channels[5][seen], (np.pi / 2 - 0.5) / 0.5, rtol=1e-5)
+        self.assertEqual(np.abs(channels[5][~seen]).max(), 0)
 
 
 class Loss(unittest.TestCase):

@@ -37,7 +37,7 @@ class WarmStart(unittest.TestCase):
         self.folder = Path(scratch.name)
 
     def exported(self, network):
-        export_onnx(network, self.folder / "model.onnx", 16, 64, True)
+        export_onnx(network, self.folder / "model.onnx", (5, 16, 64), True)
         return self.folder
 
     def test_gives_what_the_model_gives(self):
@@ -102,6 +102,20 @@ class WarmStart(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "model.yaml: its classes"):
             check(config["mean"], class_names()[::-1])
         check_description(self.folder / "best.pt", config)
+
+    def test_a_channel_that_the_model_does_not_see_counts_for_nothing_at_first(self):
+        network, other = used(LightRangeNet(8, STAGES), 4), LightRangeNet(8, STAGES, inputs=6)
+        images = torch.randn(2, 6, 16, 64)
+        with torch.no_grad():
+            expected = network.eval()(images[:, :5])
+        load_weights(other, self.exported(network), [images])
+        with torch.no_grad():
+            found = other.eval()(images)
+        torch.testing.assert_close(found, expected, rtol=1e-3, atol=1e-3)
+        torch.save({"averaged": network.state_dict()}, self.folder / "best.pt")
+        load_weights(other, self.folder / "best.pt", [])
+        with torch.no_grad():
+            torch.testing.assert_close(other.eval()(images), expected)
 
     def test_takes_the_best_of_a_run(self):
         network, other = used(LightRangeNet(8, STAGES), 3), LightRangeNet(8, STAGES)

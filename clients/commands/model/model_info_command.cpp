@@ -66,8 +66,7 @@ ExitCode run(const RunArguments& arguments) {
   EngineOptions choice;
   set_engine(arguments.engine, choice);
   const OpenedNetwork opened = open_network(model, choice);
-  const std::size_t values_an_image = input_channels * static_cast<std::size_t>(model.rows) *
-                                      static_cast<std::size_t>(model.columns);
+  const std::size_t values_an_image = model.input_size();
   const std::vector<float> images = read_values<float>(arguments.input, values_an_image);
   std::vector<float> probabilities;
   for (std::size_t at = 0; at < images.size(); at += values_an_image) {

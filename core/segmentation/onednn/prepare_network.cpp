@@ -49,9 +49,9 @@ PreparedNetwork prepare_network(const OnnxFile& file, const ModelDescription& mo
   const RowsColumns stride = network_stride(graph);
   require_multiple("rows", model.rows, stride.rows);
   require_multiple("columns", model.columns, stride.columns);
-  infer_shapes(
-      graph,
-      {.channels = static_cast<int>(input_channels), .rows = model.rows, .columns = model.columns});
+  infer_shapes(graph, {.channels = static_cast<int>(model.statistics.channels),
+                       .rows = model.rows,
+                       .columns = model.columns});
   require_output(graph, model);
   network.giga_operations = count_operations(graph);
   network.had_softmax = drop_final_softmax(graph);

@@ -20,7 +20,8 @@ from networks import make_network
 def load_run(folder, file="best.pt"):
     """The network of best.pt or last.pt, and the run's state."""
     state = torch.load(folder / file, map_location="cpu")
-    network = make_network(state["config"]["network"], len(class_names()))
+    config = state["config"]
+    network = make_network(config["network"], len(class_names()), len(config["mean"]))
     network.load_state_dict(state["averaged"])
     return network.eval(), state
 
@@ -93,7 +94,8 @@ def main():
         subprocess.run([*map(str, command), *arguments.calibrate], check=True)
         engines.append(("onednn", "int8"))
     image = description["image"]
-    images = random_images(2, image["rows"], image["columns"])
+    shape = len(description["statistics"]), image["rows"], image["columns"]
+    images = random_images(2, shape)
     with tempfile.TemporaryDirectory() as scratch:
         check_engines(
             arguments.stillmap, arguments.folder, network, images, Path(scratch), engines

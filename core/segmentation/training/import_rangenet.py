@@ -172,7 +172,7 @@ def main():
     print(f"{arguments.folder}: model.onnx and model.yaml written")
     if arguments.no_check:
         return
-    images = random_images(1, description["image"]["rows"], description["image"]["columns"])
+    images = random_images(1, (5, description["image"]["rows"], description["image"]["columns"]))
     with tempfile.TemporaryDirectory() as scratch:
         results = check_engines(
             arguments.stillmap,

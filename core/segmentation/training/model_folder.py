@@ -10,15 +10,16 @@ import yaml
 from networks import WithSoftmax
 from scans import CLASS_NAMES
 
-CHANNELS = ("range", "x", "y", "z", "remission")
+CHANNELS = ("range", "x", "y", "z", "remission", "slope")
 
 
-def export_onnx(network, file, rows, columns, free_size):
-    """Writes the network with a soft-max. `free_size` leaves rows and columns open."""
+def export_onnx(network, file, shape, free_size):
+    """Writes the network with a soft-max. `shape`: channels, rows, columns; `free_size` leaves the
+    last two open."""
     axes = {2: "rows", 3: "columns"}
     torch.onnx.export(
         WithSoftmax(network).cpu().eval(),
-        torch.zeros(1, 5, rows, columns),
+        torch.zeros(1, *shape),
         str(file),
         opset_version=13,
         input_names=["range_image"],
@@ -47,9 +48,8 @@ def write_model(folder, network, description):
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     image = description["image"]
-    export_onnx(
-        network, folder / "model.onnx", image["rows"], image["columns"], image["follow_sensor"]
-    )
+    shape = len(description["statistics"]), image["rows"], image["columns"]
+    export_onnx(network, folder / "model.onnx", shape, image["follow_sensor"])
     text = yaml.safe_dump(description, sort_keys=False, width=100, allow_unicode=True)
     (folder / "model.yaml").write_text(text)
 
@@ -88,11 +88,12 @@ def check_engines(stillmap, folder, network, images, scratch, engines):
     return results
 
 
-def random_images(count, rows, columns, seed=1):
-    """Images with empty pixels, of about the spread of normalised scans."""
+def random_images(count, shape, seed=1):
+    """Images with empty pixels, of about the spread of normalised scans. `shape`: channels, rows,
+    columns."""
     random = np.random.default_rng(seed)
-    images = random.normal(0, 1, (count, 5, rows, columns)).astype(np.float32)
-    images *= random.random((count, 1, rows, columns)) > 0.2
+    images = random.normal(0, 1, (count, *shape)).astype(np.float32)
+    images *= random.random((count, 1, *shape[1:])) > 0.2
     return images
 
 

@@ -1,7 +1,7 @@
 """The RangeNet family: DarkNet21 and DarkNet53 as lidar-bonnetal defines them, and light members.
 
-All take range images, N x 5 x rows x columns (range, x, y, z, remission, normalised), and give
-class scores (logits), N x classes x rows x columns.
+All take range images, N x inputs x rows x columns (range, x, y, z, remission, of six inputs the
+slope, normalised), and give class scores (logits), N x classes x rows x columns.
 """
 
 import torch
@@ -95,9 +95,9 @@ class DarkNetDecoderStage(nn.Module):
 class DarkNetBackbone(nn.Module):
     BLOCKS = {21: (1, 1, 2, 2, 1), 53: (1, 2, 8, 8, 4)}
 
-    def __init__(self, layers, strides, dropout, momentum):
+    def __init__(self, layers, strides, dropout, momentum, inputs):
         super().__init__()
-        self.conv1 = nn.Conv2d(5, 32, 3, padding=1, bias=False)
+        self.conv1 = nn.Conv2d(inputs, 32, 3, padding=1, bias=False)
         self.bn1 = nn.BatchNorm2d(32, momentum=momentum)
         self.dropout = nn.Dropout2d(dropout)
         for k, (blocks, stride) in enumerate(zip(self.BLOCKS[layers], strides)):
@@ -135,13 +135,13 @@ class DarkNetDecoder(nn.Module):
 class RangeNet(nn.Module):
     """RangeNet21 or RangeNet53; parameters are named as in lidar-bonnetal's checkpoint files."""
 
-    def __init__(self, layers=53, classes=20, output_stride=32, dropout=0.01, momentum=0.01):
+    def __init__(self, layers=53, classes=20, output_stride=32, dropout=0.01, momentum=0.01, inputs=5):
         super().__init__()
         strides = [2] * 5
         for k in range(4, -1, -1):
             if 2 ** sum(s == 2 for s in strides) > output_stride:
                 strides[k] = 1
-        self.backbone = DarkNetBackbone(layers, strides, dropout, momentum)
+        self.backbone = DarkNetBackbone(layers, strides, dropout, momentum, inputs)
         self.decoder = DarkNetDecoder(strides, dropout, momentum)
         self.head = nn.Sequential(nn.Dropout2d(dropout), nn.Conv2d(32, classes, 3, padding=1))
 
@@ -169,9 +169,9 @@ class LightRangeNet(nn.Module):
     `stages` lists [channels, [stride of rows, of columns], blocks] of the encoder.
     """
 
-    def __init__(self, stem, stages, classes=20, dropout=0.01, momentum=0.01):
+    def __init__(self, stem, stages, classes=20, dropout=0.01, momentum=0.01, inputs=5):
         super().__init__()
-        self.conv1 = nn.Conv2d(5, stem, 3, stride=(1, 2), padding=1, bias=False)
+        self.conv1 = nn.Conv2d(inputs, stem, 3, stride=(1, 2), padding=1, bias=False)
         self.bn1 = nn.BatchNorm2d(stem, momentum=momentum)
         self.encoder = nn.ModuleList()
         self.decoder = nn.ModuleList()
@@ -206,12 +206,12 @@ class WithSoftmax(nn.Module):
         return torch.softmax(self.network(x), dim=1)
 
 
-def make_network(settings, classes):
+def make_network(settings, classes, inputs=5):
     """The network that a configuration's `network` section describes."""
     options = dict(settings)
     kind = options.pop("kind")
     if kind in ("darknet21", "darknet53"):
-        return RangeNet(int(kind[len("darknet") :]), classes, **options)
+        return RangeNet(int(kind[len("darknet") :]), classes, inputs=inputs, **options)
     if kind == "light":
-        return LightRangeNet(classes=classes, **options)
+        return LightRangeNet(classes=classes, inputs=inputs, **options)
     raise ValueError(f"network.kind is '{kind}'; known are darknet21, darknet53, light")

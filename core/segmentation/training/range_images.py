@@ -57,8 +57,43 @@ def project(points, remission, model):
     return RangeImage(channels.reshape(5, *shape), point.reshape(shape), pixel)
 
 
+# Rows above and below a pixel among which its neighbours are sought.
+SLOPE_REACH = 3
+
+
+def _nearest_in_column(values, seen, step):
+    """Of each pixel's next seen ones in its column, at most SLOPE_REACH rows away, above (step -1) or
+    below (1); the pixel itself where there is none. `values`: k x rows x columns."""
+    found = values.copy()
+    rows = seen.shape[0]
+    for distance in range(min(SLOPE_REACH, rows - 1), 0, -1):
+        here, there = slice(0, rows - distance), slice(distance, rows)
+        if step < 0:
+            here, there = there, here
+        found[:, here] = np.where(seen[there], values[:, there], found[:, here])
+    return found
+
+
+def slope_rad(channels, seen):
+    """Angle of the surface above the horizontal, along the column: 0 on level ground, pi / 2 on a
+    wall, more under an overhang; 0 where the column shows nothing else nearby.
+
+    `channels`: of a range image; `seen`: mask of its pixels with a point."""
+    _, x, y, z = channels[:4]
+    profile = np.stack([np.sqrt(x * x + y * y), z])
+    above = _nearest_in_column(profile, seen, -1)
+    below = _nearest_in_column(profile, seen, 1)
+    away, up = above - below
+    return np.arctan2(up, away) * seen
+
+
 def normalise(image, mean, deviation):
-    """(value - mean) / deviation, and 0 in all channels of an empty pixel."""
+    """(value - mean) / deviation, and 0 in all channels of an empty pixel. Six of each: the sixth
+    channel is the slope."""
     mean = np.asarray(mean, np.float32)[:, None, None]
     deviation = np.asarray(deviation, np.float32)[:, None, None]
-    return (image.channels - mean) / deviation * (image.point >= 0)
+    seen = image.point >= 0
+    channels = image.channels
+    if len(mean) > len(channels):
+        channels = np.concatenate([channels, slope_rad(channels, seen)[None]])
+    return (channels - mean) / deviation * seen

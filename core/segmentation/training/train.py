@@ -82,7 +82,7 @@ class Run:
         self.sampler = BatchesBySensor(self.scans, settings["batch"], config["seed"], draws)
         self.samples = TrainingSamples(self.scans, config)
         torch.manual_seed(config["seed"])
-        self.network = make_network(config["network"], len(CLASS_NAMES)).to(device)
+        self.network = make_network(config["network"], len(CLASS_NAMES), len(config["mean"])).to(device)
         self.network = self.network.to(memory_format=torch.channels_last)
         self.averaged = copy.deepcopy(self.network).eval()
         self.optimiser = torch.optim.SGD(
@@ -178,7 +178,7 @@ class Run:
             loss = self.loss(self.scores(channels), target.to(self.device))
             if not torch.isfinite(loss):
                 raise SystemExit("the loss is not finite; lower optimiser.rate")
-            self.optimiser.zero_grad()
+            self.optimiser.zero_grad(set_to_none=True)
             loss.backward()
             self.optimiser.step()
             self.schedule.step()

@@ -29,8 +29,10 @@ def check_description(file, config):
         return
     model = yaml.safe_load(file.read_text())
     for field in ("mean", "deviation"):
-        values = [model["statistics"][channel][field] for channel in CHANNELS]
-        if not np.allclose(values, config[field]):
+        known = model["statistics"]
+        # A model without the slope can be taught to see it.
+        values = [known[channel][field] for channel in CHANNELS if channel in known]
+        if not np.allclose(values, config[field][: len(values)]):
             raise ValueError(f"{file}: {field} is {values}, in this configuration {config[field]}")
     if list(model["classes"].values()) != class_names():
         raise ValueError(f"{file}: its classes are not those that are trained here")
@@ -45,7 +47,10 @@ def load_weights(network, file, images):
     if file.suffix == ".onnx":
         _unfold_batch_norms(network, _load_onnx(network, file), images)
     else:
-        network.load_state_dict(torch.load(file, map_location="cpu")["averaged"])
+        weights = torch.load(file, map_location="cpu")["averaged"]
+        if "conv1.weight" in weights:
+            weights["conv1.weight"] = _for_more_inputs(weights["conv1.weight"], network.conv1)
+        network.load_state_dict(weights)
 
 
 def _load_onnx(network, file):
@@ -77,6 +82,8 @@ def _load_onnx(network, file):
                     part.bias.data.zero_()
                 continue
             place = getattr(part, field)
+            if name == "conv1" and field == "weight":
+                value = _for_more_inputs(value, part)
             if place.shape != value.shape:
                 raise ValueError(
                     f"{file}: {name}.{field} is {tuple(value.shape)}, "
@@ -87,6 +94,12 @@ def _load_onnx(network, file):
     if missing:
         raise ValueError(f"{file} has nothing for {', '.join(sorted(missing))}")
     return offsets
+
+
+def _for_more_inputs(weight, convolution):
+    """The weights of a convolution that reads fewer channels; those of the others are 0."""
+    more = convolution.in_channels - weight.shape[1]
+    return nn.functional.pad(weight, (0, 0, 0, 0, 0, more)) if more > 0 else weight
 
 
 def _part_of(node_name):

@@ -40,7 +40,7 @@ Int8Calibration calibrate(const NetworkGraph& graph) {
 
 void plan(const ModelDescription& model) {
   const OnnxFile file(model.network_file);
-  require_input_shape(file, static_cast<int>(input_channels), model.rows, model.columns);
+  require_input_shape(file, static_cast<int>(model.statistics.channels), model.rows, model.columns);
   PreparedNetwork network = prepare_network(file, model);
   static_cast<void>(plan_execution(network.graph, nullptr));
   const Int8Calibration equalised = equalise_channels(network.graph, calibrate(network.graph));
@@ -57,7 +57,7 @@ void run(Bytes bytes) {
 
 /// A layer of each kind, and a skip.
 std::string every_layer(test::SoftmaxStyle softmax) {
-  test::OnnxBuilder builder(input_channels, rows, columns);
+  test::OnnxBuilder builder(static_cast<int>(plain_input_channels), rows, columns);
   const auto stem = builder.activate(builder.normalise(
       builder.convolve("input", 4, {.kernel = {3, 3}, .stride = {1, 2}, .padding = {1, 1}}, true)));
   const auto block = builder.activate(
