@@ -87,7 +87,8 @@ class VehiclePark {
   // Without bays, vehicles park on the sidewalk where it is wide enough.
   [[nodiscard]] std::optional<Bays> bays_of(const StreetProfile& profile) const {
     if (profile.parking_m > 1.0) {
-      return Bays{profile.half_driven_m() + 0.5 * profile.parking_m, Zone::parking,
+      return Bays{profile.half_driven_m() + 0.5 * profile.parking_m,
+                  profile.has_bays ? Zone::parking : Zone::kerbside,
                   profile.parking_m > deep_bay_m};
     }
     const bool room = profile.verge_m == 0.0 && profile.sidewalk_m > 2.2;

@@ -8,8 +8,8 @@
 
 namespace stillmap::simulation {
 
-/// Use of a spot of ground.
-enum class Zone : std::uint8_t { road, parking, median, verge, sidewalk, lot, other };
+/// Use of a spot of ground; `kerbside` is road on which cars park.
+enum class Zone : std::uint8_t { road, kerbside, parking, median, verge, sidewalk, lot, other };
 
 /// A rectangle of the plan between the streets other than garden: a car park, a gravel yard.
 struct GroundPatch {
@@ -24,6 +24,8 @@ struct StreetProfile {
   double lane_width_m = 3.2;
   double bike_lane_m = 1.3;
   double parking_m = 2.2;
+  /// Without bays of their own, cars park on the road.
+  bool has_bays = true;
   double verge_m = 0.0;
   double sidewalk_m = 2.6;
 
@@ -134,6 +136,8 @@ struct CityPlan {
   /// Height of the slopes behind the streets, and of the tufts of grass [m].
   double embankment_m = 0.0;
   double tufts_m = 0.0;
+  /// White lines between lanes, and along the edge of the driven road.
+  bool lane_lines = true, edge_lines = true;
   /// Medians of stone instead of grass.
   bool paved_medians = false;
   std::vector<GroundPatch> patches;

@@ -46,7 +46,7 @@ class StreetFurnisher {
   void light_and_sign(const StreetSide& side) {
     const double kerb = side.profile.half_road_m() + 0.4;
     for (double at = random_.uniform(4.0, 16.0); at < side.length_m;
-         at += random_.uniform(24.0, 30.0)) {
+         at += random_.uniform(24.0, many_ ? 60.0 : 30.0)) {
       if (!is_pavement(side.at(at, kerb))) continue;
       place(many_ ? make_any_street_light(random_.fork()) : make_street_light(), side.at(at, kerb),
             side.heading() + quarter_turn);
@@ -68,7 +68,7 @@ class StreetFurnisher {
          at += random_.uniform(8.0, 50.0)) {
       const double heading = side.heading() + quarter_turn;
       const double kind = random_.uniform();
-      if (kind < 0.45) {
+      if (kind < 0.3) {
         add_pole_row(side, at, random_.chance(0.7) ? kerb : back);
       } else if (kind < 0.9) {
         place_on_pavement(make_street_object(random_.fork()), side.at(at, back), heading);
@@ -80,7 +80,7 @@ class StreetFurnisher {
 
   void add_pole_row(const StreetSide& side, double at, double right_m) {
     const Mesh pole = make_any_pole(random_.fork());
-    const std::size_t count = 1 + random_.index(5);
+    const std::size_t count = 1 + random_.index(4);
     const double step = random_.uniform(1.2, 2.5);
     for (std::size_t i = 0; i < count; ++i) {
       place_on_pavement(pole, side.at(at + static_cast<double>(i) * step, right_m), 0.0);

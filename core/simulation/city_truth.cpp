@@ -14,6 +14,7 @@ namespace {
 SemanticClass class_of(Zone zone, const CityPlan& plan) {
   switch (zone) {
     case Zone::road:
+    case Zone::kerbside:
       return SemanticClass::road;
     case Zone::parking:
       return SemanticClass::parking;

@@ -49,7 +49,8 @@ Zone zone_by(const NearestStreet& street, const NearestStreet& other) {
   }
   if (street.distance_m < profile.half_driven_m()) return Zone::road;
   if (street.distance_m < profile.half_road_m()) {
-    return clear > bay_clearance_m ? Zone::parking : Zone::road;
+    if (clear <= bay_clearance_m) return Zone::road;
+    return profile.has_bays ? Zone::parking : Zone::kerbside;
   }
   const bool verge = street.distance_m < profile.half_road_m() + profile.verge_m;
   return verge && clear > bay_clearance_m ? Zone::verge : Zone::sidewalk;
@@ -70,7 +71,9 @@ double tuft(const Eigen::Vector2d& spot_plan) {
   return Random(61, cell(spot_plan.x()), cell(spot_plan.y())).uniform();
 }
 
-bool is_driven(Zone zone) { return zone == Zone::road || zone == Zone::parking; }
+bool is_driven(Zone zone) {
+  return zone == Zone::road || zone == Zone::kerbside || zone == Zone::parking;
+}
 
 }  // namespace
 

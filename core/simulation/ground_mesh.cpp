@@ -44,6 +44,7 @@ std::vector<double> axis_lines(const std::vector<StreetPlan>& streets, double ma
 Surface surface_of(Zone zone, const CityPlan& plan) {
   switch (zone) {
     case Zone::road:
+    case Zone::kerbside:
       return Surface::asphalt;
     case Zone::parking:
       return Surface::parking_bay;
@@ -64,10 +65,12 @@ bool is_country_edge(Zone left, Zone right) {
   return (is_lot(left) && right != Zone::sidewalk) || (is_lot(right) && left != Zone::sidewalk);
 }
 
+bool is_carriageway(Zone zone) { return zone == Zone::road || zone == Zone::kerbside; }
+
 // The step between two neighbouring zones along the edge a-b: a kerb, or nothing.
 void add_step(Mesh& mesh, const GroundShape& ground, const Eigen::Vector2d& a,
               const Eigen::Vector2d& b, Zone left, Zone right) {
-  if (left == right) return;
+  if (left == right || (is_carriageway(left) && is_carriageway(right))) return;
   mesh.add_quad(ground.on_ground(a, left).cast<float>(), ground.on_ground(b, left).cast<float>(),
                 ground.on_ground(b, right).cast<float>(), ground.on_ground(a, right).cast<float>(),
                 is_country_edge(left, right) ? Surface::grass : Surface::kerb);
@@ -102,13 +105,15 @@ void add_stripe(Mesh& mesh, const GroundShape& ground, const Leg& leg, const Str
 void add_leg_lines(Mesh& mesh, const GroundShape& ground, const Leg& leg) {
   const StreetProfile& profile = ground.plan().route_profile;
   const double clear = profile.half_road_m() + 3.0;
+  const CityPlan& plan = ground.plan();
   for (double at = clear; at + 3.0 < leg.length_m - clear; at += 8.0) {
     const bool has_median = profile.half_median_m > 0.0;
-    for (int line = has_median ? 1 : 0; line < profile.lanes; ++line) {
+    for (int line = has_median ? 1 : 0; plan.lane_lines && line < profile.lanes; ++line) {
       const double offset = profile.half_median_m + line * profile.lane_width_m;
       add_stripe(mesh, ground, leg, {at, at + 3.0, offset, 0.14});
       if (line > 0) add_stripe(mesh, ground, leg, {at, at + 3.0, -offset, 0.14});
     }
+    if (!plan.edge_lines) continue;
     const double edge = profile.half_median_m + profile.lanes * profile.lane_width_m;
     for (const double side : {-1.0, 1.0}) {
       add_stripe(mesh, ground, leg, {at, at + 8.0, side * edge, 0.12});

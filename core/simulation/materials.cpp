@@ -15,8 +15,11 @@ double shade(const Eigen::Vector3f& spot_map, double size_m) {
   return Random(71, cell(spot_map.x()), cell(spot_map.y()), cell(spot_map.z())).uniform();
 }
 
+// Mostly little: grass is mown, and hedges are cut.
 void draw_pile(Materials& materials, Surface surface, double min_m, double max_m, Random& random) {
-  materials.properties[static_cast<std::size_t>(surface)].pile_m = random.between(min_m, max_m);
+  const double high = random.uniform();
+  materials.properties[static_cast<std::size_t>(surface)].pile_m =
+      static_cast<float>(min_m + (max_m - min_m) * high * high);
 }
 
 void draw_lost(Materials& materials, Surface surface, double min_lost, double max_lost,
@@ -103,14 +106,22 @@ Materials random_materials(Random random) {
     materials.properties[i].reflectivity *=
         static_cast<float>(std::exp(random.uniform(-spread, spread)));
   }
+  // Signs are rarely seen head on, clean and new.
+  materials.properties[static_cast<std::size_t>(Surface::sign_face)].reflectivity *=
+      random.between(0.15, 1.0);
   // Bays often share the road's asphalt.
   if (random.chance(0.5)) {
     materials.properties[static_cast<std::size_t>(Surface::parking_bay)].reflectivity =
         materials.of(Surface::asphalt).reflectivity;
   }
+  // So do sidewalks of asphalt.
+  if (random.chance(0.1)) {
+    materials.properties[static_cast<std::size_t>(Surface::pavement)].reflectivity =
+        materials.of(Surface::asphalt).reflectivity * random.between(0.9, 1.3);
+  }
   draw_pile(materials, Surface::grass, 0.0, 0.09, random);
   draw_pile(materials, Surface::leaves, 0.0, 0.25, random);
-  draw_pile(materials, Surface::hedge, 0.02, 0.3, random);
+  draw_pile(materials, Surface::hedge, 0.0, 0.3, random);
   draw_pile(materials, Surface::gravel, 0.0, 0.03, random);
   draw_pile(materials, Surface::cloth, 0.0, 0.03, random);
   draw_pile(materials, Surface::bark, 0.0, 0.04, random);

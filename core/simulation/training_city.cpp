@@ -32,7 +32,9 @@ SensorModel any_sensor(Random& random) {
 }
 
 BeamNoise random_noise(Random& random) {
-  return {.range_sigma_m = random.uniform(0.005, 0.05),
+  // Of most lidars below a centimetre.
+  const double noisy = random.uniform();
+  return {.range_sigma_m = 0.004 + 0.04 * noisy * noisy * noisy,
           .drop_share = random.chance(0.3) ? random.uniform(0.0, 0.1) : random.uniform(0.0, 0.02),
           .intensity_sigma = random.uniform(0.005, 0.09),
           .min_return = 1.2e-5 * std::exp(random.uniform(-1.0, 1.4))};
@@ -54,16 +56,16 @@ StreetProfile random_profile(Random& random, bool is_country) {
   const double size = random.uniform();
   profile.lanes = size < 0.9 ? 1 : size < 0.98 ? 2 : 3;
   profile.half_median_m = random.chance(0.2) ? random.uniform(0.5, 5.0) : 0.0;
-  profile.lane_width_m = random.uniform(2.2, 3.2);
+  profile.lane_width_m = random.uniform(2.2, random.chance(0.3) ? 4.5 : 3.2);
   profile.bike_lane_m = random.chance(0.3) ? random.uniform(1.0, 1.8) : random.uniform(0.0, 0.5);
   const double parking = random.uniform();
-  profile.parking_m = 0.0;
-  if (parking > 0.7) profile.parking_m = random.uniform(2.0, 2.6);
+  profile.has_bays = parking > 0.7;
+  profile.parking_m = parking > 0.35 ? random.uniform(2.0, 2.6) : 0.0;
   if (parking > 0.87) profile.parking_m = random.uniform(4.4, 5.6);
   profile.verge_m = random.chance(0.5) ? random.uniform(0.6, 6.0) : 0.0;
-  profile.sidewalk_m = random.chance(is_country ? 0.6 : 0.1)
+  profile.sidewalk_m = random.chance(is_country ? 0.6 : 0.06)
                            ? 0.0
-                           : random.uniform(1.2, random.chance(0.5) ? 6.5 : 3.0);
+                           : random.uniform(1.5, random.chance(0.6) ? 9.0 : 4.0);
   return profile;
 }
 
@@ -96,12 +98,14 @@ void draw_ground(CityPlan& plan, Random& random, bool is_country) {
   plan.bend_m = random.chance(0.3) ? 0.0 : random.uniform(0.0, 0.15) * plan.bend_length_m;
   plan.hill_length_m = random.uniform(40.0, 100.0);
   plan.hill_m = random.chance(0.3) ? 0.1 : random.uniform(0.0, 0.05) * plan.hill_length_m;
-  plan.kerb_m = random.chance(is_country ? 0.6 : 0.1) ? 0.0 : random.uniform(0.02, 0.2);
+  plan.kerb_m = random.chance(is_country ? 0.75 : 0.1) ? 0.0 : random.uniform(0.02, 0.2);
   plan.share_driveways = random.chance(0.6) ? random.uniform(0.1, 0.8) : 0.0;
   plan.share_paved_yards = is_country || random.chance(0.4) ? 0.0 : random.uniform();
   plan.embankment_m = random.chance(0.5) ? random.uniform(0.3, 3.5) : 0.0;
-  plan.tufts_m = random.uniform(0.0, 0.08);
+  plan.tufts_m = random.chance(0.5) ? 0.0 : random.uniform(0.0, 0.08);
   plan.paved_medians = random.chance(0.2);
+  plan.lane_lines = random.chance(0.6);
+  plan.edge_lines = random.chance(is_country ? 0.7 : 0.3);
 }
 
 // Car parks and gravel yards beside the streets.
@@ -119,7 +123,7 @@ void draw_patches(CityPlan& plan, Random& random) {
     const Vector2d low(u, inner);
     const Vector2d high(u + random.uniform(12.0, 40.0), inner + far);
     plan.patches.push_back(
-        {Eigen::AlignedBox2d(low, high), random.chance(0.75) ? Zone::parking : Zone::other});
+        {Eigen::AlignedBox2d(low, high), random.chance(0.5) ? Zone::parking : Zone::other});
   }
 }
 
@@ -160,7 +164,7 @@ void draw_blocks(CityPlan& plan, Random& random, bool is_country) {
 void draw_traffic(CityPlan& plan, Random& random) {
   plan.traffic = {
       .vehicles_per_km = random.uniform(0.0, 35.0),
-      .share_trucks = random.uniform(0.0, 0.12),
+      .share_trucks = random.uniform(0.0, 0.2),
       .share_buses = random.uniform(0.0, 0.1),
       .cyclists_per_km = random.uniform(0.0, 35.0),
       .pedestrians_per_km = random.uniform(0.0, 60.0),
@@ -172,7 +176,7 @@ void draw_traffic(CityPlan& plan, Random& random) {
       .share_other_vehicles = random.uniform(0.0, 0.12),
       .groups_per_100m = random.uniform(0.0, 5.0)};
   plan.parking = {.share_motorcycles = random.uniform(0.0, 0.2),
-                  .share_trucks = random.uniform(0.0, 0.1),
+                  .share_trucks = random.uniform(0.0, 0.15),
                   .share_buses = random.uniform(0.0, 0.06),
                   .share_other_vehicles = random.uniform(0.0, 0.12),
                   .share_bicycles = random.uniform(0.0, 0.3)};
@@ -184,7 +188,7 @@ CityPlan training_plan(Random random) {
   CityPlan plan;
   plan.name = "training";
   plan.many_shapes = true;
-  const bool is_country = random.chance(0.3);
+  const bool is_country = random.chance(0.35);
   draw_streets(plan, random, is_country);
   draw_ground(plan, random, is_country);
   draw_patches(plan, random);

@@ -68,6 +68,47 @@ TEST_F(Ground, KerbIsAStepOfItsHeight) {
               1e-9);
 }
 
+TEST_F(Ground, WithoutBaysVehiclesParkOnTheRoad) {
+  for (std::vector<StreetPlan>* streets : {&plan_.streets_along_u, &plan_.streets_along_v})
+    for (StreetPlan& street : *streets) street.profile.has_bays = false;
+  plan_.route_profile.has_bays = false;
+  const GroundShape unmarked(plan_, 3);
+  const Eigen::Vector2d bay(30.0, plan_.route_profile.half_road_m() - 0.5);
+  EXPECT_EQ(ground_.zone(bay), Zone::parking);
+  EXPECT_EQ(unmarked.zone(bay), Zone::kerbside);
+  // At the same height as the road, and of its asphalt.
+  EXPECT_EQ(unmarked.height(bay, Zone::kerbside), unmarked.height(bay, Zone::road));
+  const auto count = [](const GroundShape& ground, Surface surface) {
+    Mesh mesh;
+    add_ground(mesh, ground);
+    return std::ranges::count(mesh.surfaces, surface);
+  };
+  EXPECT_GT(count(ground_, Surface::parking_bay), 100);
+  EXPECT_EQ(count(unmarked, Surface::parking_bay), 0);
+  // As many vehicles as in bays, none of them elsewhere.
+  const auto parked = [](const GroundShape& ground) {
+    const City city = build_city(ground, 5, 5);
+    return std::ranges::count(city.bodies, standing_label(ObjectKind::car), &Body::label);
+  };
+  EXPECT_GT(parked(unmarked), 5);
+  EXPECT_EQ(parked(unmarked), parked(ground_));
+}
+
+TEST_F(Ground, LinesArePaintedAsThePlanSays) {
+  const auto lines = [this] {
+    Mesh mesh;
+    add_lane_markings(mesh, GroundShape(plan_, 3));
+    return mesh.surfaces.size();
+  };
+  const std::size_t all = lines();
+  plan_.edge_lines = false;
+  const std::size_t between_lanes = lines();
+  plan_.lane_lines = false;
+  const std::size_t none = lines();
+  EXPECT_LT(between_lanes, all);
+  EXPECT_LT(none, between_lanes);
+}
+
 TEST_F(Ground, JunctionIsRoadAndHasNoParking) {
   EXPECT_EQ(ground_.zone({0.0, 0.0}), Zone::road);
   EXPECT_EQ(ground_.zone({0.0, 5.9}), Zone::road);

@@ -29,7 +29,7 @@ TEST(TrainingPlan, VariesEverything) {
   std::set<int> lanes;
   std::map<std::string, int> sensors;
   int without_sidewalk = 0, without_kerb = 0, sloped = 0, with_car_park = 0, without_houses = 0;
-  int at_sidewalk = 0, paved_yards = 0;
+  int at_sidewalk = 0, paved_yards = 0, parked_on_road = 0, without_lines = 0, quiet_lidars = 0;
   constexpr int sequences = 600;
   for (std::uint64_t seed = 0; seed < sequences; ++seed) {
     const SimulationConfig sequence = training_sequence(seed);
@@ -43,6 +43,10 @@ TEST(TrainingPlan, VariesEverything) {
     without_houses += blocks.share_open + blocks.share_wood > 0.6 ? 1 : 0;
     at_sidewalk += blocks.setback_max_m < 0.4 ? 1 : 0;
     paved_yards += sequence.plan.share_paved_yards > 0.3 ? 1 : 0;
+    const StreetProfile& profile = sequence.plan.route_profile;
+    parked_on_road += profile.parking_m > 0.0 && !profile.has_bays ? 1 : 0;
+    without_lines += !sequence.plan.lane_lines && !sequence.plan.edge_lines ? 1 : 0;
+    quiet_lidars += sequence.noise.range_sigma_m < 0.01 ? 1 : 0;
     EXPECT_LE(blocks.share_fence + blocks.share_hedge + blocks.share_wall + blocks.share_thicket,
               1.0);
     EXPECT_LE(blocks.share_open + blocks.share_wood + blocks.share_halls, 1.0 + 1e-9);
@@ -53,7 +57,7 @@ TEST(TrainingPlan, VariesEverything) {
   EXPECT_NEAR(sensors["HDL-32E"], 0.1 * sequences, 0.05 * sequences);
   EXPECT_EQ(sensors.size(), 4U);
   for (const int count : {without_sidewalk, without_kerb, sloped, with_car_park, without_houses,
-                          at_sidewalk, paved_yards}) {
+                          at_sidewalk, paved_yards, parked_on_road, without_lines, quiet_lidars}) {
     EXPECT_GT(count, sequences / 20);
     EXPECT_LT(count, sequences);
   }
