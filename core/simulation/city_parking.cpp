@@ -84,7 +84,7 @@ class VehiclePark {
     bool across;
   };
 
-  // Without bays, vehicles park on the sidewalk where it is wide enough.
+  // Where the street has no room for parking, vehicles stand on a sidewalk that is wide enough.
   [[nodiscard]] std::optional<Bays> bays_of(const StreetProfile& profile) const {
     if (profile.parking_m > 1.0) {
       return Bays{profile.half_driven_m() + 0.5 * profile.parking_m,

@@ -91,6 +91,38 @@ TEST(SurfaceSlope, LooksAcrossTwoEmptyRowsButNoFurther) {
   EXPECT_EQ(slope_rad[3U * 90U], 0.0F);
 }
 
+/// The definition, a pixel at a time.
+float by_hand(const RangeImage& image, const std::vector<Vector3f>& points, int row, int column) {
+  const auto seen = [&](int r) {
+    return r >= 0 && r < image.rows() &&
+           image.nearest()[image.pixel(r, column)] != RangeImage::none;
+  };
+  if (!seen(row)) return 0.0F;
+  const auto neighbour = [&](int step) {
+    int r = row;
+    for (int away = 3; away > 0; --away)
+      if (seen(row + step * away)) r = row + step * away;
+    return points[static_cast<std::size_t>(image.nearest()[image.pixel(r, column)])];
+  };
+  const Vector3f above = neighbour(-1), below = neighbour(1);
+  return std::atan2(above.z() - below.z(), above.head<2>().norm() - below.head<2>().norm());
+}
+
+TEST(SurfaceSlope, IsThatOfItsDefinitionInEveryPixel) {
+  const Scan scan = test::random_scan(700, 9);
+  const RangeImage image(scan.points_lidar, model);
+  const std::vector<float> slope_rad = surface_slope_rad(image, scan.points_lidar);
+  int sloping = 0;
+  for (int row = 0; row < model.rows; ++row) {
+    for (int column = 0; column < model.columns; ++column) {
+      const float expected = by_hand(image, scan.points_lidar, row, column);
+      EXPECT_NEAR(slope_rad[image.pixel(row, column)], expected, 4e-4F) << row << ' ' << column;
+      sloping += expected != 0.0F ? 1 : 0;
+    }
+  }
+  EXPECT_GT(sloping, 200);
+}
+
 TEST(SurfaceSlope, IsFiniteForAnyScan) {
   Scan scan = test::random_scan(3000, 5);
   scan.points_lidar[7].x() = std::numeric_limits<float>::quiet_NaN();
