@@ -89,6 +89,8 @@ struct Odometry::State {
     result = fits.are_known()
                  ? confirmed_by_points(result, features, map, method())
                  : confirmed_at_start(result, features, map, has_prior_map || goes_on, method());
+    if (result.health == OdometryHealth::good && fits.is_contradicted_by_points(result))
+      result = moved_where_points_agree(result, features, map, method());
     keep_to_limits(last, prediction, !has_jumped, sensor.motion_limits, result);
   }
   /// Calls a pose good only where the map says so that is older than any doubt of the place.

@@ -30,6 +30,8 @@ constexpr double max_point_deviation_rad = 0.035;
 constexpr double max_first_deviation_m = 0.1;
 constexpr double max_first_deviation_rad = 0.01;
 constexpr double min_first_gain = 0.25;
+/// Both kinds of points want to go the same way where one goes this share of what the other does.
+constexpr double min_same_way = 0.5;
 /// A pose that traffic pulls by more than this is not called good [m, rad].
 constexpr double max_pull_m = 0.1;
 constexpr double max_pull_rad = 0.01;
@@ -51,30 +53,6 @@ constexpr double foretold_angle_rad = 0.01;
 /// many are tried.
 constexpr double proposal_reach_m = 6.0;
 constexpr std::size_t max_proposals = 4;
-/// The first scans find less of the map with every step: nothing is judged by fewer than these.
-constexpr int min_fits_seen = 8;
-/// With this share of the usual fit of all its features a scan is believed where little stands up.
-constexpr double clear_fit_share = 0.85;
-/// A scan of which a smaller share than this lies in known space could lie anywhere.
-constexpr double min_believed_overlap = 0.1;
-/// A pose whose OdometryResult::upright_fit is a smaller share than this of what they have lately
-/// been is not believed. Simulated drives with hard turns fall to 0.58; scans of another city, or
-/// of the wrong place in this one, reach 0.32.
-constexpr double min_believed_fit_share = 0.5;
-/// The same, and the share of the scan in known space, where the motion foretold the place.
-constexpr double min_foretold_fit_share = 0.35;
-constexpr double min_foretold_overlap = 0.5;
-/// The same, where nothing told the place: streets look alike. A street 3 m off reaches 0.54, the
-/// right place across a gap of 33 m 0.77.
-constexpr double min_relocalized_fit_share = 0.65;
-/// Share of the usual fit of all features with which a scan tells a place. Scans across a gap of
-/// 20 m have 0.65 to 0.89, those at the end of one of 65 m 0.15.
-constexpr double min_confirming_fit_share = 0.5;
-/// Share of the running mean of fits below which other starts are tried.
-constexpr double min_fit_share = 0.95;
-/// Weight of the newest fit in the running mean.
-constexpr double fit_mean_gain = 0.1;
-
 /// Which of two poses is the right one: the fit of what stands up, less where little of the scan
 /// lies in known space.
 double agreement(const OdometryResult& result) {
@@ -110,13 +88,16 @@ bool agree(const OdometryResult& a, const OdometryResult& b) {
          difference.tail<3>().norm() < max_angle_rad;
 }
 
+std::size_t movable_points(const FeatureSets& features) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      features.points, [](const FeaturePoint& point) { return is_movable(point.label); }));
+}
+
 /// Whether enough is left of the scan without what could move by its label.
 bool labels_tell_enough(const FeatureSets& features, const OdometryConfig& config) {
-  constexpr std::ptrdiff_t min_points = 100;
+  constexpr std::size_t min_points = 100;
   return config.weighting == Weighting::semantic &&
-         std::ranges::count_if(features.points, [](const FeaturePoint& point) {
-           return !is_movable(point.label);
-         }) >= min_points;
+         features.points.size() >= min_points + movable_points(features);
 }
 
 /// The best of several starts, by two witnesses: the features, and the points, whose values lie
@@ -250,10 +231,10 @@ struct SecondOpinion {
         aligned(align_points(features, map.points, found.T_map_lidar, found.sweep_correction,
                              {.without_movable = without_movable})),
         off(boxminus(aligned.T_map_lidar, found.T_map_lidar)) {
-    pose.point_deviation_m = off.head<3>().norm();
+    pose.point_deviation_m = off.head<3>();
   }
   [[nodiscard]] bool confirms() const {
-    return pose.point_deviation_m < max_point_deviation_m &&
+    return pose.point_deviation_m.norm() < max_point_deviation_m &&
            off.tail<3>().norm() < max_point_deviation_rad;
   }
 
@@ -275,6 +256,21 @@ std::vector<Eigen::Isometry3d> starts_without_prediction(const RegisteredScan& l
   return starts;
 }
 
+/// What the features say of a pose, which they do not move.
+OdometryResult judged_in_place(const OdometryResult& found, const Eigen::Isometry3d& T_map_lidar,
+                               const FeatureSets& features, const LocalMap& map,
+                               const OdometryConfig& config) {
+  OdometryConfig in_place = config;
+  in_place.registration.max_iterations = 1;
+  OdometryResult result =
+      register_features(features, map, T_map_lidar, in_place, found.sweep_correction);
+  if (result.health == OdometryHealth::lost) return found;
+  result.T_map_lidar = T_map_lidar;
+  result.sweep_correction = found.sweep_correction;
+  result.health = OdometryHealth::degenerate;
+  return result;
+}
+
 /// A pose that features found, or where the points align clearly better, as confirmed_at_start
 /// says.
 OdometryResult led_by_points(const OdometryResult& found, const FeatureSets& features,
@@ -294,15 +290,7 @@ OdometryResult led_by_points(const OdometryResult& found, const FeatureSets& fea
   // Whether traffic pulls the features shows where nothing holds the points.
   const double min_gain = 1.0 + min_first_gain * found.fit;
   if (agrees || aligned.fit < min_gain * fit_there) return found;
-  // What the features say of that pose, which they do not move.
-  OdometryConfig in_place = config;
-  in_place.registration.max_iterations = 1;
-  OdometryResult result = register_features(features, map, T_led, in_place, found.sweep_correction);
-  if (result.health == OdometryHealth::lost) return found;
-  result.T_map_lidar = T_led;
-  result.sweep_correction = found.sweep_correction;
-  result.health = OdometryHealth::degenerate;
-  return result;
+  return judged_in_place(found, T_led, features, map, config);
 }
 
 }  // namespace
@@ -322,45 +310,6 @@ SweepPrior RegisteredScan::sweep_prior(double interval_to_next_s, const SweepTim
   prior.compensated = compensated.twist();
   prior.rotation_is_measured = compensated.rotation_is_measured();
   return prior;
-}
-
-void FitStatistics::add(const OdometryResult& result) {
-  if (result.health == OdometryHealth::lost || result.health == OdometryHealth::initialised) return;
-  ++count_;
-  const double gain = std::max(fit_mean_gain, 1.0 / count_);
-  mean_fit_ += gain * (result.fit - mean_fit_);
-  mean_upright_fit_ += gain * (result.upright_fit - mean_upright_fit_);
-}
-
-bool FitStatistics::are_known() const { return count_ >= min_fits_seen; }
-
-bool FitStatistics::fits(const OdometryResult& result) const {
-  return result.health != OdometryHealth::lost && result.fit >= min_fit_share * mean_fit_;
-}
-
-bool FitStatistics::fits_poorly(const OdometryResult& result) const {
-  return result.health == OdometryHealth::lost ||
-         (are_known() && result.fit < clear_fit_share * mean_fit_);
-}
-
-bool FitStatistics::believes(const OdometryResult& result) const {
-  if (!are_known()) return true;
-  const bool stands_well = result.upright_fit >= min_believed_fit_share * mean_upright_fit_;
-  return (stands_well || result.fit >= clear_fit_share * mean_fit_) &&
-         result.overlap >= min_believed_overlap;
-}
-
-bool FitStatistics::believes_foretold(const OdometryResult& result) const {
-  return result.upright_fit >= min_foretold_fit_share * mean_upright_fit_ &&
-         result.overlap >= min_foretold_overlap;
-}
-
-bool FitStatistics::believes_relocalized(const OdometryResult& result) const {
-  return result.upright_fit >= min_relocalized_fit_share * mean_upright_fit_;
-}
-
-bool FitStatistics::confirms(const OdometryResult& result) const {
-  return result.fit >= min_confirming_fit_share * mean_fit_;
 }
 
 OdometryResult confirmed_by_points(const OdometryResult& found, const FeatureSets& features,
@@ -391,10 +340,26 @@ OdometryResult confirmed_at_start(const OdometryResult& found, const FeatureSets
   if (is_start_known) {
     const OdometryResult confirmed = confirmed_by_points(found, features, map, config);
     if (confirmed.health == OdometryHealth::good &&
-        confirmed.point_deviation_m < max_first_deviation_m)
+        confirmed.point_deviation_m.norm() < max_first_deviation_m)
       return confirmed;
   }
   return confirmed_by_points(led_by_points(found, features, map, config), features, map, config);
+}
+
+OdometryResult moved_where_points_agree(const OdometryResult& found, const FeatureSets& features,
+                                        const LocalMap& map, const OdometryConfig& config) {
+  if (!labels_tell_enough(features, config) ||
+      2 * movable_points(features) < features.points.size())
+    return found;
+  const SecondOpinion of_all(found, features, map, /*without_movable=*/false);
+  const SecondOpinion of_static(found, features, map, /*without_movable=*/true);
+  const Eigen::Vector3d way = of_all.off.head<3>();
+  if (of_static.off.head<3>().dot(way) < min_same_way * way.squaredNorm()) return found;
+  OdometryResult moved = judged_in_place(
+      found, moved_level(found.T_map_lidar, of_all.aligned.T_map_lidar), features, map, config);
+  moved.point_deviation_m = found.point_deviation_m;
+  moved.health = OdometryHealth::degenerate;
+  return moved;
 }
 
 OdometryResult doubted_where_pulled(OdometryResult found, const FeatureSets& features,

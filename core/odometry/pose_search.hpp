@@ -1,40 +1,11 @@
 #pragma once
 
+#include "core/odometry/fit_statistics.hpp"
 #include "core/odometry/registration.hpp"
 #include "core/odometry/se3.hpp"
 #include "core/odometry/sweep_motion.hpp"
 
 namespace stillmap {
-
-/// How well scans have lately fitted the local map: what a fit is judged by.
-class FitStatistics {
- public:
-  /// A scan that was registered.
-  void add(const OdometryResult& result);
-
-  /// Whether enough fits are known to judge by.
-  [[nodiscard]] bool are_known() const;
-
-  /// Whether a scan lies as well on the local map as scans have lately: no other start is tried.
-  [[nodiscard]] bool fits(const OdometryResult& result) const;
-  /// Whether it lies so much worse that the lidar may be somewhere else.
-  [[nodiscard]] bool fits_poorly(const OdometryResult& result) const;
-  /// Whether a pose can be believed; all can before enough fits are known.
-  [[nodiscard]] bool believes(const OdometryResult& result) const;
-  /// The same, where registration came to the place that motion foretold (see is_foretold).
-  [[nodiscard]] bool believes_foretold(const OdometryResult& result) const;
-  /// The same, where no prediction told the place: by what stands up in it alone, and more of that.
-  [[nodiscard]] bool believes_relocalized(const OdometryResult& result) const;
-  /// Whether enough of all its features fits to tell a place by, where part of it lies in unknown
-  /// space.
-  [[nodiscard]] bool confirms(const OdometryResult& result) const;
-
- private:
-  /// Running means of OdometryResult::fit and upright_fit.
-  double mean_fit_ = 0.0;
-  double mean_upright_fit_ = 0.0;
-  int count_ = 0;
-};
 
 /// Time beyond which the last velocity is not extrapolated [s].
 constexpr double max_prediction_s = 1.0;
@@ -87,6 +58,14 @@ struct PosePrediction {
 [[nodiscard]] OdometryResult confirmed_at_start(const OdometryResult& found,
                                                 const FeatureSets& features, const LocalMap& map,
                                                 bool is_start_known, const OdometryConfig& config);
+
+/// `found`, or, of a scan of which labels leave less than half, where the points align, degenerate,
+/// if those of any class and those of classes that cannot move want to go the same way: then it is
+/// not traffic that pulls them, but the few features left that slide, such as by wrong labels.
+[[nodiscard]] OdometryResult moved_where_points_agree(const OdometryResult& found,
+                                                      const FeatureSets& features,
+                                                      const LocalMap& map,
+                                                      const OdometryConfig& config);
 
 /// `found`, but no pose that was found without a robust kernel is good unless it stays where it is
 /// with one: traffic pulls the one along, and not the other.

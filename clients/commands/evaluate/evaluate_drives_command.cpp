@@ -189,7 +189,10 @@ std::vector<DriveResult> run_drive(const MutatedDrive& drive,
       if (found != nullptr)
         std::cerr << " " << run.last_error() << "; it " << found->iterations << " e "
                   << found->edge_correspondences << " p " << found->plane_correspondences << " rms "
-                  << found->rms_residual_m;
+                  << found->rms_residual_m << " fit " << found->fit << " upright "
+                  << found->upright_fit << " overlap " << found->overlap << " points off by "
+                  << found->point_deviation_m.transpose() << " m, sigma "
+                  << std::sqrt(found->covariance.diagonal().head<2>().maxCoeff()) << " m";
       std::cerr << "\n";
     }
     if (!scan_done(++seen)) break;
