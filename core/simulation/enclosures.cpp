@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "core/simulation/city_shapes.hpp"
 
 namespace stillmap::simulation {
@@ -72,6 +74,17 @@ void add_rails(Mesh& mesh, float length_m, float height, Random& random) {
   add_posts(mesh, length_m, height, 0.05F, Surface::fence_metal);
 }
 
+// Posts between which wires are too thin to be seen.
+void add_lone_posts(Mesh& mesh, float length_m, float height, Random& random) {
+  const float step = random.between(0.6, 2.5);
+  const float radius = random.between(0.03, 0.08);
+  for (float x = 0.0F; x < length_m; x += step) {
+    const float lean = random.between(-0.1, 0.1);
+    add_tube(mesh, {{x, 0, buried_m}, {x + lean, lean, height}, radius, radius, 6},
+             Surface::fence_wood);
+  }
+}
+
 }  // namespace
 
 Mesh make_wooden_fence(float length_m) {
@@ -129,7 +142,7 @@ Mesh make_any_fence(float length_m, Random random) {
   if (random.chance(0.2)) {
     add_box(mesh, {0, -0.1F, buried_m}, {length_m, 0.1F, 0.25F * height}, Surface::garden_wall);
   }
-  switch (random.index(6)) {
+  switch (random.index(7)) {
     case 0:
       add_wire_mesh(mesh, length_m, height, random);
       break;
@@ -144,6 +157,9 @@ Mesh make_any_fence(float length_m, Random random) {
       break;
     case 4:
       mesh.append(make_any_crash_barrier(length_m, random), Eigen::Isometry3f::Identity());
+      break;
+    case 5:
+      add_lone_posts(mesh, length_m, std::min(height, 1.6F), random);
       break;
     default:
       add_rails(mesh, length_m, height, random);

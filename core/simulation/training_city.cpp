@@ -142,9 +142,9 @@ void draw_blocks(CityPlan& plan, Random& random, bool is_country) {
   blocks.gap_max_m = suburb ? random.uniform(2.0, 18.0) : random.uniform(0.0, 4.0);
   blocks.floors_min = 1 + static_cast<int>(random.index(2));
   blocks.floors_max = blocks.floors_min + static_cast<int>(random.index(suburb ? 3 : 5));
-  blocks.trees_per_100m = random.uniform(5.0, 30.0);
+  blocks.trees_per_100m = random.uniform(2.0, 22.0);
   blocks.garden_trees_per_100m = random.uniform(10.0, 90.0);
-  blocks.share_fence = random.uniform(0.1, 0.6);
+  blocks.share_fence = random.uniform(0.15, 0.7);
   blocks.share_hedge = random.uniform(0.1, 0.95 - blocks.share_fence);
   blocks.share_thicket = random.uniform(0.0, 0.95 - blocks.share_fence - blocks.share_hedge);
   blocks.share_wall = 0.95 - blocks.share_fence - blocks.share_hedge - blocks.share_thicket;
@@ -167,16 +167,16 @@ void draw_traffic(CityPlan& plan, Random& random) {
       .share_trucks = random.uniform(0.0, 0.2),
       .share_buses = random.uniform(0.0, 0.1),
       .cyclists_per_km = random.uniform(0.0, 35.0),
-      .pedestrians_per_km = random.uniform(0.0, 60.0),
+      .pedestrians_per_km = random.uniform(0.0, 40.0),
       .crossing_pedestrians = static_cast<int>(random.index(8)),
       .speed_mps = random.uniform(7.0, 13.0),
       .light_red_s = random.uniform(4.0, 12.0),
       .parked_per_100m = random.chance(0.15) ? 0 : 4 + static_cast<int>(random.index(12)),
       .share_motorcyclists = random.uniform(0.0, 0.5),
       .share_other_vehicles = random.uniform(0.0, 0.12),
-      .groups_per_100m = random.uniform(0.0, 5.0)};
-  plan.parking = {.share_motorcycles = random.uniform(0.0, 0.2),
-                  .share_trucks = random.uniform(0.0, 0.15),
+      .groups_per_100m = random.uniform(0.0, 3.0)};
+  plan.parking = {.share_motorcycles = random.uniform(0.0, 0.12),
+                  .share_trucks = random.uniform(0.0, 0.3),
                   .share_buses = random.uniform(0.0, 0.06),
                   .share_other_vehicles = random.uniform(0.0, 0.12),
                   .share_bicycles = random.uniform(0.0, 0.3)};

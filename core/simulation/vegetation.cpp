@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -22,10 +23,10 @@ TreePlan random_tree(Random& random) {
   TreePlan tree{};
   tree.height_m = random.between(3.0, random.chance(0.5) ? 16.0 : 9.0);
   tree.conifer = random.chance(0.15);
-  const double bare = tree.conifer ? random.uniform(0.03, 0.2) : random.uniform(0.12, 0.5);
+  const double bare = tree.conifer ? random.uniform(0.03, 0.2) : random.uniform(0.06, 0.45);
   tree.trunk_m = static_cast<float>(bare) * tree.height_m;
   tree.spread_m = random.between(0.16, 0.42) * tree.height_m;
-  tree.radius_m = random.between(0.012, 0.035) * tree.height_m;
+  tree.radius_m = random.between(0.01, 0.028) * tree.height_m;
   tree.leaf_m = random.between(0.09, 0.28);
   tree.cover = random.between(0.35, 1.6);
   return tree;
@@ -51,6 +52,23 @@ void add_limbs(Mesh& mesh, const TreePlan& tree, const Vector3f& foot, const Vec
                                           reach * std::sin(static_cast<float>(angle)),
                                           random.between(0.1, 0.8) * reach);
     add_tube(mesh, {start, end, 0.35F * tree.radius_m, 0.08F * tree.radius_m, 5}, Surface::bark);
+  }
+}
+
+// Three stakes round a young tree, tied at their tops.
+void add_stakes(Mesh& mesh, Random& random) {
+  const float reach = random.between(0.3, 0.8);
+  const float height = random.between(1.3, 2.2);
+  const float inwards = random.between(0.6, 1.0);
+  std::array<Vector3f, 3> tops;
+  for (std::size_t i = 0; i < tops.size(); ++i) {
+    const float angle = 2.0F * std::numbers::pi_v<float> * static_cast<float>(i) / 3.0F;
+    const Vector3f out(reach * std::cos(angle), reach * std::sin(angle), 0);
+    tops[i] = inwards * out + Vector3f(0, 0, height);
+    add_tube(mesh, {out - Vector3f(0, 0, 0.4F), tops[i], 0.04F, 0.04F, 5}, Surface::bark);
+  }
+  for (std::size_t i = 0; i < tops.size(); ++i) {
+    add_tube(mesh, {tops[i], tops[(i + 1) % tops.size()], 0.025F, 0.025F, 5}, Surface::bark);
   }
 }
 
@@ -170,6 +188,7 @@ Mesh make_any_tree(Random random) {
   const Vector3f tip = top + Vector3f(0, 0, 0.7F * (tree.height_m - tree.trunk_m));
   add_tube(mesh, {top, tip, 0.7F * tree.radius_m, 0.1F * tree.radius_m, 6}, Surface::bark);
   add_limbs(mesh, tree, foot, tip, random);
+  if (tree.height_m < 7.0F && random.chance(0.3)) add_stakes(mesh, random);
   if (tree.conifer) {
     add_conifer_crown(mesh, tree, top, random);
   } else {
@@ -224,7 +243,7 @@ Mesh make_any_hedge(float length_m, Random random) {
   const float height = random.between(0.5, random.chance(0.5) ? 3.0 : 1.8);
   const float depth = random.between(0.4, 1.2);
   if (random.chance(0.6)) {
-    const float bump = random.between(0.02, 0.2);
+    const float bump = random.between(0.01, random.chance(0.5) ? 0.2 : 0.06);
     add_leafy_wall(mesh, {length_m, height, depth, bump, random.uniform(0.0, 0.05)}, random);
     return mesh;
   }
@@ -248,7 +267,7 @@ Mesh make_any_thicket(float length_m, Random random) {
   Mesh mesh;
   const float height = random.between(1.8, random.chance(0.5) ? 7.0 : 4.0);
   const float depth = random.between(0.8, 3.0);
-  const float bump = random.between(0.1, 0.6);
+  const float bump = random.between(0.04, random.chance(0.5) ? 0.6 : 0.2);
   add_leafy_wall(mesh, {length_m, height, depth, bump, random.uniform(0.0, 0.3)}, random);
   return mesh;
 }
