@@ -28,10 +28,11 @@ constexpr double min_confirming_fit_share = 0.5;
 constexpr double min_fit_share = 0.95;
 /// Weight of the newest fit in the running mean.
 constexpr double fit_mean_gain = 0.1;
-/// Weight of the newest deviation of the points in the running mean, and its length [m] above which
-/// they contradict.
+/// Weight of the newest deviation of the points in the running mean, its length above which they
+/// contradict, and as much as one counts for at most: one alone does not contradict [m].
 constexpr double deviation_mean_gain = 0.25;
 constexpr double max_mean_deviation_m = 0.05;
+constexpr double max_counted_deviation_m = 0.2;
 
 }  // namespace
 
@@ -79,9 +80,13 @@ bool FitStatistics::is_contradicted_by_points(const OdometryResult& result) cons
   return are_known() && mean_point_deviation_with(result).norm() > max_mean_deviation_m;
 }
 
-Eigen::Vector3d FitStatistics::mean_point_deviation_with(const OdometryResult& result) const {
-  return mean_point_deviation_m_ +
-         deviation_mean_gain * (result.point_deviation_m - mean_point_deviation_m_);
+void FitStatistics::forget_point_deviation() { mean_point_deviation_m_.setZero(); }
+
+Eigen::Vector2d FitStatistics::mean_point_deviation_with(const OdometryResult& result) const {
+  Eigen::Vector2d deviation_m = result.point_deviation_m.head<2>();
+  const double length_m = deviation_m.norm();
+  if (length_m > max_counted_deviation_m) deviation_m *= max_counted_deviation_m / length_m;
+  return mean_point_deviation_m_ + deviation_mean_gain * (deviation_m - mean_point_deviation_m_);
 }
 
 }  // namespace stillmap

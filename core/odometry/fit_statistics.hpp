@@ -28,18 +28,20 @@ class FitStatistics {
   /// Whether enough of all its features fits to tell a place by, where part of it lies in unknown
   /// space.
   [[nodiscard]] bool confirms(const OdometryResult& result) const;
-  /// Whether the points have lately all wanted to go the same way, with this pose: one scan may be
-  /// pulled by traffic, but features that slide along are contradicted again and again.
+  /// Whether the points have lately, with this pose, wanted to go the same level way: one scan may
+  /// be pulled by traffic, but features that slide are contradicted again and again.
   [[nodiscard]] bool is_contradicted_by_points(const OdometryResult& result) const;
+  /// Where what comes lies in the map as it was before.
+  void forget_point_deviation();
 
  private:
-  [[nodiscard]] Eigen::Vector3d mean_point_deviation_with(const OdometryResult& result) const;
+  [[nodiscard]] Eigen::Vector2d mean_point_deviation_with(const OdometryResult& result) const;
 
   /// Running means of OdometryResult::fit and upright_fit.
   double mean_fit_ = 0.0;
   double mean_upright_fit_ = 0.0;
-  /// Of OdometryResult::point_deviation_m.
-  Eigen::Vector3d mean_point_deviation_m_ = Eigen::Vector3d::Zero();
+  /// Of OdometryResult::point_deviation_m, along the map's x and y.
+  Eigen::Vector2d mean_point_deviation_m_ = Eigen::Vector2d::Zero();
   int count_ = 0;
 };
 

@@ -80,8 +80,8 @@ struct RegistrationConfig {
   /// switches it off. Weighting::none goes without it [m].
   double robust_scale_m = 0.1;
   /// How far the motion within a sweep differs from that since the last pose: standard deviations
-  /// [m, rad], the rotation's about the map's z. 0 metres: the motion within the sweep is not
-  /// estimated.
+  /// [m, rad], the rotation's about the map's z, and at least that: half of how much a turn changes
+  /// is more. 0 metres: the motion within the sweep is not estimated.
   double sweep_translation_m = 0.03;
   double sweep_rotation_rad = 0.005;
   /// The same of the rotation about level axes of the map, whose z points up: few rings hardly tell

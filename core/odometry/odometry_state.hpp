@@ -66,7 +66,8 @@ struct OdometryResult {
   /// The same as `fit`, of the features in known space alone, and without those on level planes:
   /// ground lies on ground anywhere.
   double upright_fit = 0.0;
-  /// Where the alignment of plain points would move the pose, along the map's axes [m].
+  /// Where the alignment of plain points would move the pose that features found, along the map's
+  /// axes [m].
   Eigen::Vector3d point_deviation_m = Eigen::Vector3d::Zero();
   /// Root mean square of the weighted residuals after the last iteration [m].
   double rms_residual_m = 0.0;

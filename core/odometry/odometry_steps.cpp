@@ -221,6 +221,7 @@ void Odometry::State::forget_stretch() {
   UnconfirmedStretch::Trusted trusted = stretch->take_trusted();
   map = std::move(trusted.map);
   fits = trusted.fits;
+  fits.forget_point_deviation();
   last = std::move(trusted.last);
   intervals = trusted.intervals;
   history = RangeImageHistory(config.motion);

@@ -30,8 +30,10 @@ constexpr double max_point_deviation_rad = 0.035;
 constexpr double max_first_deviation_m = 0.1;
 constexpr double max_first_deviation_rad = 0.01;
 constexpr double min_first_gain = 0.25;
-/// Both kinds of points want to go the same way where one goes this share of what the other does.
+/// Both kinds of points want to go the same way where one goes this share of what the other does
+/// along it, and either more than this [m].
 constexpr double min_same_way = 0.5;
+constexpr double min_way_m = 0.02;
 /// A pose that traffic pulls by more than this is not called good [m, rad].
 constexpr double max_pull_m = 0.1;
 constexpr double max_pull_rad = 0.01;
@@ -53,6 +55,7 @@ constexpr double foretold_angle_rad = 0.01;
 /// many are tried.
 constexpr double proposal_reach_m = 6.0;
 constexpr std::size_t max_proposals = 4;
+
 /// Which of two poses is the right one: the fit of what stands up, less where little of the scan
 /// lies in known space.
 double agreement(const OdometryResult& result) {
@@ -256,6 +259,12 @@ std::vector<Eigen::Isometry3d> starts_without_prediction(const RegisteredScan& l
   return starts;
 }
 
+bool want_the_same(const Eigen::Vector2d& way_m, const Eigen::Vector2d& other_way_m) {
+  const double along_m2 = way_m.dot(other_way_m);
+  const double longer_m2 = std::max(way_m.squaredNorm(), other_way_m.squaredNorm());
+  return longer_m2 > min_way_m * min_way_m && along_m2 >= min_same_way * way_m.squaredNorm();
+}
+
 /// What the features say of a pose, which they do not move.
 OdometryResult judged_in_place(const OdometryResult& found, const Eigen::Isometry3d& T_map_lidar,
                                const FeatureSets& features, const LocalMap& map,
@@ -353,8 +362,7 @@ OdometryResult moved_where_points_agree(const OdometryResult& found, const Featu
     return found;
   const SecondOpinion of_all(found, features, map, /*without_movable=*/false);
   const SecondOpinion of_static(found, features, map, /*without_movable=*/true);
-  const Eigen::Vector3d way = of_all.off.head<3>();
-  if (of_static.off.head<3>().dot(way) < min_same_way * way.squaredNorm()) return found;
+  if (!want_the_same(of_all.off.head<2>(), of_static.off.head<2>())) return found;
   OdometryResult moved = judged_in_place(
       found, moved_level(found.T_map_lidar, of_all.aligned.T_map_lidar), features, map, config);
   moved.point_deviation_m = found.point_deviation_m;

@@ -209,9 +209,11 @@ constexpr double expected_residual_m = 0.05;
 /// Neighbouring residuals err alike: beside the prior, all of a scan's count as this many.
 constexpr double independent_correspondences = 100.0;
 
-/// A turn that is another one than the last began or ended at any moment of the sweep: its rotation
-/// differs from that since the last pose by about this share of the change.
+/// A turn that is not the one that points were compensated for began or ended at any moment of the
+/// sweep, whose rotation differs from that since the last pose by about this share of the change,
+/// and by no more than this [rad].
 constexpr double turn_change_share = 0.5;
+constexpr double max_turn_deviation_rad = 0.05;
 
 /// Error of a sweep's rotation that a gyro measured [rad].
 constexpr double measured_rotation_rad = 0.0005;
@@ -232,9 +234,10 @@ void add_sweep_prior(const SweepPrior& prior, const OdometryResult& at,
   const PoseTangent deviation = at.sweep_correction - change;
   PoseTangent weight;
   weight.head<3>().setConstant(std::pow(expected_residual_m / config.sweep_translation_m, 2));
-  Eigen::Vector3d rotation_rad(
-      config.sweep_tilt_rad, config.sweep_tilt_rad,
-      std::max(config.sweep_rotation_rad, turn_change_share * std::abs(change[5])));
+  const double turn_change_rad = std::abs(rotated(at.T_map_lidar.linear(), change)[5]);
+  const double turn_rad = std::min(turn_change_share * turn_change_rad, max_turn_deviation_rad);
+  Eigen::Vector3d rotation_rad(config.sweep_tilt_rad, config.sweep_tilt_rad,
+                               std::max(config.sweep_rotation_rad, turn_rad));
   if (prior.rotation_is_measured) rotation_rad.setConstant(measured_rotation_rad);
   weight.tail<3>() = (expected_residual_m * rotation_rad.cwiseInverse()).cwiseAbs2();
   weight *= correspondences / independent_correspondences;

@@ -101,6 +101,7 @@ TEST(WrongLabels, PointsKeepFeaturesFromSliding) {
   Mapper mapper(mapper_config, std::make_unique<PassthroughSegmenter>());
   const Eigen::Isometry3d T_first = simulation.T_map_lidar_at(0.0);
   double worst_m = 0.0;
+  int good = 0;
   for (int k = 0; k < config.scans; ++k) {
     Scan scan = simulation.scan(k).scan;
     std::ranges::replace(scan.labels, SemanticClass::building, SemanticClass::car);
@@ -110,8 +111,11 @@ TEST(WrongLabels, PointsKeepFeaturesFromSliding) {
         T_first.inverse() * simulation.T_map_lidar_at(k * config.sensor.period_s);
     worst_m =
         std::max(worst_m, (truth.inverse() * mapped->odometry.T_map_lidar).translation().norm());
+    EXPECT_NE(mapped->odometry.health, OdometryHealth::lost) << "scan " << k;
+    good += mapped->odometry.health == OdometryHealth::good ? 1 : 0;
   }
   EXPECT_LT(worst_m, 0.3);
+  EXPECT_GT(good, config.scans / 2);
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -40,6 +40,17 @@ TEST(FitStatistics, PointsThatAreScatteredDoNotContradict) {
   }
 }
 
+TEST(FitStatistics, OneScanThatIsFarOffDoesNotMakeTheNextOnesDoubtful) {
+  FitStatistics fits = statistics_after(20);
+  EXPECT_FALSE(fits.is_contradicted_by_points(scan_moved_by(1.0)));
+  fits.add(scan_moved_by(1.0));
+  EXPECT_FALSE(fits.is_contradicted_by_points(scan_moved_by(0.04)));
+  fits.add(scan_moved_by(1.0));
+  EXPECT_TRUE(fits.is_contradicted_by_points(scan_moved_by(1.0)));
+  fits.forget_point_deviation();
+  EXPECT_FALSE(fits.is_contradicted_by_points(scan_moved_by(0.12)));
+}
+
 TEST(FitStatistics, FewScansAreNoReasonToDoubt) {
   FitStatistics fits;
   fits.add(scan_moved_by(0.3));
