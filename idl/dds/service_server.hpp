@@ -33,10 +33,12 @@ struct ServiceOptions {
   /// Does the thread's work, and what is to be done where that throws: what `answer` throws is
   /// refused in words, but the transport and `idle` can fail, too.
   std::function<void(const std::function<void()>& work)> run = [](const auto& work) { work(); };
+  /// Answers one request and sends the reply, and returns after that.
+  std::function<void(const std::function<void()>& work)> turn = [](const auto& work) { work(); };
 };
 
 /// The newest replies of a service, so that a call that comes again is answered again and not
-/// carried out again. One thread uses it.
+/// carried out again. One thread at a time uses it.
 class AnsweredRequests {
  public:
   using Clock = std::chrono::steady_clock;
@@ -66,7 +68,7 @@ class AnsweredRequests {
 };
 
 /// The server's end of one ROS 2 service, for clients of rmw_fastrtps and of rmw_cyclonedds. One
-/// thread uses it.
+/// thread at a time uses it.
 class UntypedServiceServer {
  public:
   using TypeSupport = eprosima::fastdds::dds::TypeSupport;
@@ -159,6 +161,7 @@ class ServiceServer {
                 std::function<Reply(const Request&)> answer, ServiceOptions options = {})
       : answer_(std::move(answer)),
         idle_(std::move(options.idle)),
+        turn_(std::move(options.turn)),
         server_(participant, service, type_support<Request>(), type_support<Reply>(),
                 options.carries_out_once, make_refusal()),
         thread_([this, run = std::move(options.run)](const std::stop_token& stop) {
@@ -174,12 +177,16 @@ class ServiceServer {
         idle_();
         continue;
       }
-      try {
-        const Reply reply = answer_(request);
-        server_.send_reply(*call, &reply);
-      } catch (const std::exception& fault) {
-        server_.send_failure(*call, fault.what());
-      }
+      turn_([&] { answer(*call, request); });
+    }
+  }
+
+  void answer(const ServiceCall& call, const Request& request) {
+    try {
+      const Reply reply = answer_(request);
+      server_.send_reply(call, &reply);
+    } catch (const std::exception& fault) {
+      server_.send_failure(call, fault.what());
     }
   }
 
@@ -198,6 +205,7 @@ class ServiceServer {
 
   std::function<Reply(const Request&)> answer_;
   std::function<void()> idle_;
+  std::function<void(const std::function<void()>& work)> turn_;
   UntypedServiceServer server_;
   // Last member: stops before the others are destroyed.
   std::jthread thread_;

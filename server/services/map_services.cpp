@@ -1,24 +1,39 @@
 #include "server/services/map_services.hpp"
 
-#include <tbb/task_arena.h>
-
 #include <functional>
+#include <memory>
+#include <string>
 #include <utility>
 
 #include "idl/dds/service_server.hpp"
 #include "server/services/service_handlers.hpp"
 #include "server/threads/background_throttle.hpp"
 #include "server/threads/thread_failure.hpp"
+#include "server/threads/thread_name.hpp"
 
 namespace stillmap::server {
 namespace {
 
-/// What clients ask for does not hold up poses where the cores are busy: neither on this thread nor
-/// on oneTBB's workers, which go to the mapper first.
-void run_service(const std::function<void()>& work) {
-  static_cast<void>(use_scheduling(BackgroundScheduling::low));
-  tbb::task_arena behind_the_mapper(tbb::task_arena::automatic, 1, tbb::task_arena::priority::low);
-  behind_the_mapper.execute([&] { run_or_report(work); });
+using Work = std::function<void()>;
+
+/// Long answers do not hold up poses where the cores are busy: neither on this thread nor on
+/// oneTBB's workers, which go to the mapper first.
+dds::ServiceOptions in_background(const std::string& name) {
+  return {.run = [name](const Work& work) {
+    name_this_thread(name);
+    static_cast<void>(use_scheduling(BackgroundScheduling::low));
+    run_behind_the_mapper([&] { run_or_report(work); });
+  }};
+}
+
+dds::ServiceOptions promptly(const std::string& name, PromptBudget& budget) {
+  return {.run =
+              [name](const Work& work) {
+                name_this_thread(name);
+                run_or_report(work);
+              },
+          .turn = [turns = std::make_shared<PromptTurns>(budget, name)](
+                      const Work& work) { turns->run(work); }};
 }
 
 }  // namespace
@@ -26,18 +41,21 @@ void run_service(const std::function<void()>& work) {
 MapServices::MapServices(dds::Participant& participant, const std::string& name_space,
                          ServiceContext context)
     : context_(std::move(context)) {
-  for_each_handler([&]<typename Request, typename Reply>(
-                       const ServiceHandler<Request, Reply>& handler) {
-    const std::string name = handler.spec.in(name_space);
-    auto answer = [this, answer = handler.answer](const Request& request) {
-      return answer(context_, request);
-    };
-    servers_.push_back(std::make_shared<dds::ServiceServer<Request, Reply>>(
-        participant, name, logged(context_.log, name, std::move(answer)),
-        dds::ServiceOptions{.carries_out_once = handler.spec.effect == dds::ServiceEffect::modifies,
-                            .idle = [this, idle = handler.idle] { idle(context_); },
-                            .run = run_service}));
-  });
+  for_each_handler(
+      [&]<typename Request, typename Reply>(const ServiceHandler<Request, Reply>& handler) {
+        const std::string name = handler.spec.in(name_space);
+        auto answer = [this, answer = handler.answer](const Request& request) {
+          return answer(context_, request);
+        };
+        const std::string thread_name(handler.spec.name);
+        dds::ServiceOptions options = handler.urgency == AnswerUrgency::prompt
+                                          ? promptly(thread_name, prompt_budget_)
+                                          : in_background(thread_name);
+        options.carries_out_once = handler.spec.effect == dds::ServiceEffect::modifies;
+        options.idle = [this, idle = handler.idle] { idle(context_); };
+        servers_.push_back(std::make_shared<dds::ServiceServer<Request, Reply>>(
+            participant, name, logged(context_.log, name, std::move(answer)), std::move(options)));
+      });
 }
 
 }  // namespace stillmap::server

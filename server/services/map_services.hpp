@@ -6,11 +6,12 @@
 
 #include "idl/dds/participant.hpp"
 #include "server/services/service_context.hpp"
+#include "server/threads/prompt_turns.hpp"
 
 namespace stillmap::server {
 
 /// The server's ends of all services of the table, each on its own thread, so that a large answer
-/// delays no other service.
+/// delays no other service. On busy cores the mapper goes first, but for short prompt answers.
 class MapServices {
  public:
   /// Throws DdsError when the topics cannot be made.
@@ -18,6 +19,7 @@ class MapServices {
 
  private:
   ServiceContext context_;
+  PromptBudget prompt_budget_;
   /// A dds::ServiceServer each.
   std::vector<std::shared_ptr<void>> servers_;
 };

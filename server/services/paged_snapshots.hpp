@@ -13,7 +13,7 @@ namespace stillmap::server {
 /// Views of the map that clients page through, so that all pages of an answer show one version. A
 /// view holds the memory of every tile that has changed since, so it goes soon after the last page,
 /// or when nobody has asked for the next one for long. Any number of clients may page as long as
-/// their views hold no more than `max_bytes`. One thread uses it.
+/// their views hold no more than `max_bytes`. One thread at a time uses it.
 class PagedSnapshots {
  public:
   using Clock = std::chrono::steady_clock;

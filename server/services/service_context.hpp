@@ -51,7 +51,7 @@ struct ServiceContext {
   ServiceLog& log;
   /// A client that wants more gets more pages of get_static_map.
   std::uint32_t max_page_bytes = 8'000'000;
-  /// Used by get_static_map alone, on one thread.
+  /// Used by get_static_map alone, by one thread at a time.
   std::shared_ptr<PagedSnapshots> paged_snapshots = std::make_shared<PagedSnapshots>();
 };
 

@@ -64,12 +64,21 @@ void drop_expired_pages(const ServiceContext& context);
 [[nodiscard]] nav_msgs::srv::GetMap_Response get_map(const ServiceContext& context,
                                                      const nav_msgs::srv::GetMap_Request& request);
 
+/// Which answers may take processor time from the mapper.
+enum class AnswerUrgency {
+  /// None: they are long, or nobody waits for them to move on.
+  background,
+  /// Those that planners wait for, as long as all of them take little (PromptBudget).
+  prompt,
+};
+
 /// What answers a service.
 template <typename Request, typename Reply>
 struct ServiceHandler {
   dds::ServiceSpec<Request, Reply> spec;
   Reply (*answer)(const ServiceContext& context, const Request& request);
-  /// Called once a second while there are no requests, on the thread of `answer`.
+  AnswerUrgency urgency = AnswerUrgency::background;
+  /// Called once a second while there are no requests, never beside `answer`.
   void (*idle)(const ServiceContext& context) = [](const ServiceContext&) {};
 };
 template <typename Request, typename Reply, typename... Rest>
@@ -77,21 +86,23 @@ ServiceHandler(dds::ServiceSpec<Request, Reply>, Rest...) -> ServiceHandler<Requ
 
 /// A handler for every service.
 inline constexpr std::tuple service_handlers{
-    ServiceHandler{dds::services::get_static_map, get_static_map, drop_expired_pages},
-    ServiceHandler{dds::services::get_tile_versions, get_tile_versions},
-    ServiceHandler{dds::services::get_tiles, get_tiles},
-    ServiceHandler{dds::services::get_status, get_status},
+    ServiceHandler{dds::services::get_static_map, get_static_map, AnswerUrgency::prompt,
+                   drop_expired_pages},
+    ServiceHandler{dds::services::get_tile_versions, get_tile_versions, AnswerUrgency::prompt},
+    ServiceHandler{dds::services::get_tiles, get_tiles, AnswerUrgency::prompt},
+    ServiceHandler{dds::services::get_status, get_status, AnswerUrgency::prompt},
     ServiceHandler{dds::services::save_map, save_map},
     ServiceHandler{dds::services::load_map, load_map},
     ServiceHandler{dds::services::reset, reset},
     ServiceHandler{dds::services::octomap_binary, octomap_binary},
     ServiceHandler{dds::services::octomap_full, octomap_full},
-    ServiceHandler{dds::services::query_occupancy, query_occupancy},
+    ServiceHandler{dds::services::query_occupancy, query_occupancy, AnswerUrgency::prompt},
     ServiceHandler{dds::services::get_removed, get_removed},
     ServiceHandler{dds::services::restore_removed, restore_removed},
-    ServiceHandler{dds::services::get_traversable_area, get_traversable_area},
-    ServiceHandler{dds::services::check_path, check_path},
-    ServiceHandler{dds::services::nearest_traversable, nearest_traversable},
+    ServiceHandler{dds::services::get_traversable_area, get_traversable_area,
+                   AnswerUrgency::prompt},
+    ServiceHandler{dds::services::check_path, check_path, AnswerUrgency::prompt},
+    ServiceHandler{dds::services::nearest_traversable, nearest_traversable, AnswerUrgency::prompt},
     ServiceHandler{dds::services::localize, localize},
     ServiceHandler{dds::services::get_map, get_map}};
 static_assert(std::tuple_size_v<decltype(service_handlers)> ==

@@ -28,13 +28,6 @@ constexpr auto poll_period = 1ms;
 /// Beyond the process's own nice value.
 constexpr int low_nice = 10;
 
-/// Processor time of the calling thread, which stands still while the scheduler prefers others.
-std::chrono::nanoseconds thread_cpu_time() {
-  timespec used{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
-  return std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec);
-}
-
 /// Nice values are a thread's own in Linux.
 bool add_nice(int more) {
   const auto thread = static_cast<id_t>(::gettid());
@@ -42,6 +35,12 @@ bool add_nice(int more) {
 }
 
 }  // namespace
+
+std::chrono::nanoseconds thread_cpu_time() {
+  timespec used{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
+  return std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec);
+}
 
 bool use_scheduling(BackgroundScheduling scheduling) {
   if (scheduling == BackgroundScheduling::normal) return true;
