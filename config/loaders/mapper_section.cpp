@@ -71,6 +71,7 @@ void read_registration(YamlSection section, RegistrationConfig& registration) {
   section.number("sweep_translation_m", registration.sweep_translation_m, {0, 10});
   section.number("sweep_rotation_rad", registration.sweep_rotation_rad, {1e-6, 10});
   section.number("sweep_tilt_rad", registration.sweep_tilt_rad, {1e-6, 10});
+  section.number("sweep_bend_rad", registration.sweep_bend_rad, {0, 10});
   section.number("across_rings_weight", registration.across_rings_weight, shares);
   section.number("min_plane_width", registration.min_plane_width, shares);
   section.integer("sparse_ring_neighbours", registration.sparse_ring_neighbours, {5, 16});

@@ -54,9 +54,8 @@ Eigen::Isometry3d MapSurroundings::align(const LocalizationQuery& query,
   const PointAlignmentConfig rough{.max_distance_m = 1.0, .kernel_m = 0.5, .max_iterations = 15};
   const PointAlignmentConfig fine{.max_distance_m = 0.5, .kernel_m = 0.15, .max_iterations = 20};
   const Eigen::Isometry3d T =
-      align_points(query.features_upright, points_, T_map_upright, PoseTangent::Zero(), rough)
-          .T_map_lidar;
-  return align_points(query.features_upright, points_, T, PoseTangent::Zero(), fine).T_map_lidar;
+      align_points(query.features_upright, points_, T_map_upright, {}, rough).T_map_lidar;
+  return align_points(query.features_upright, points_, T, {}, fine).T_map_lidar;
 }
 
 PoseEvidence MapSurroundings::evidence(const LocalizationQuery& query,

@@ -41,11 +41,11 @@ std::optional<Straightened> straightened(const TwoScans& scans, Eigen::Isometry3
     result.T_map_first = scans.first.T_map_stamp * motion_of(velocity * scans.first.sweep.middle_s);
     result.map.clear();
     extend_local_map(result.map, scans.first.features, result.T_map_first,
-                     velocity * scans.first.sweep.duration_s);
+                     {.twist = velocity * scans.first.sweep.duration_s});
     moving.sweep_prior.T_map_lidar_last = result.T_map_first;
     result.second = register_features(moving, result.map,
                                       result.T_map_first * motion_of(velocity * scans.interval_s),
-                                      scans.config, velocity * scans.sweep.duration_s);
+                                      scans.config, {.twist = velocity * scans.sweep.duration_s});
     if (result.second.health == OdometryHealth::lost) return std::nullopt;
     T_first_second = result.T_map_first.inverse() * result.second.T_map_lidar;
   }

@@ -77,8 +77,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   step.result = doubted_where_pulled(step.result, features, state.map, state.config);
   state.straighten(features, time_ns, sweep, step.result);
   step.T_map_lidar_middle = step.result.T_map_lidar;
-  const Eigen::Isometry3d T_correction = motion_of(step.result.sweep_correction);
-  deskew_to_middle(scan, sweep, T_correction);
+  move_to_middle(scan, sweep, step.result.sweep_correction);
   // Moving points stay out of the local map, eq. (9) and c > c_th.
   step.motion = classify_point_motion(scan, labels, parts.objects, parts.motion_classes,
                                       step.T_map_lidar_middle, state.map, state.config);
@@ -90,7 +89,8 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   // What users see is at the stamp: points and pose go there from the middle of the sweep.
   if (sweep.middle_s != 0.0) {
     const double stamp_part = sweep.duration_s > 0.0 ? -sweep.middle_s / sweep.duration_s : 0.0;
-    const Eigen::Isometry3d T = scaled_motion(T_correction, stamp_part) * T_middle_stamp();
+    const Eigen::Isometry3d T =
+        T_middle_at(step.result.sweep_correction, stamp_part) * T_middle_stamp();
     move_points(scan, T.inverse());
     step.result.T_map_lidar = step.result.T_map_lidar * T;
   }

@@ -71,6 +71,8 @@ void check(const RegistrationConfig& c, const LocalMapConfig& map, FaultList& fa
                  c.sweep_rotation_rad, "above 0");
   faults.require(c.sweep_tilt_rad > 0.0, "registration.sweep_tilt_rad", c.sweep_tilt_rad,
                  "above 0");
+  faults.require(c.sweep_bend_rad >= 0.0, "registration.sweep_bend_rad", c.sweep_bend_rad,
+                 "0 or more");
   faults.require(c.min_correspondences >= 6, "registration.min_correspondences",
                  c.min_correspondences, "6 or more");
   faults.require(c.min_plane_width >= 0.0 && c.min_plane_width < 1.0,

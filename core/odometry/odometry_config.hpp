@@ -87,6 +87,10 @@ struct RegistrationConfig {
   /// The same of the rotation about level axes of the map, whose z points up: few rings hardly tell
   /// a tilt within the sweep from one of the lidar, and what they take for it adds up [rad].
   double sweep_tilt_rad = 0.003;
+  /// How far a turn about the map's z swells or ebbs within a sweep: the deviation of
+  /// SweepCorrection::bend [rad], at least; in a turn it is as much as the turn. 0: turns are taken
+  /// to be steady within a sweep.
+  double sweep_bend_rad = 0.002;
   /// What the distance across the rings counts, 0..1, of a line that runs along a ring of the
   /// lidar: any surface shows such lines, where the lidar happens to look. Not in the paper; 1
   /// switches it off.

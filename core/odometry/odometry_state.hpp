@@ -40,6 +40,16 @@ enum class MapEntry : std::uint8_t {
   return entry == MapEntry::enters || entry == MapEntry::enters_with_waiting;
 }
 
+/// Motion of the lidar during a sweep beyond what its points were compensated for, along the
+/// lidar's axes in its middle.
+struct SweepCorrection {
+  /// Translation [m] and rotation [rad] from its start to its end.
+  Eigen::Matrix<double, 6, 1> twist = Eigen::Matrix<double, 6, 1>::Zero();
+  /// Rotation [rad] that grows with the square of the sweep's part (SweepTimes::part): twice as
+  /// much is what the sweep's last turning rate has more than its first, a sweep.
+  Eigen::Vector3d bend = Eigen::Vector3d::Zero();
+};
+
 /// What registration says of one scan.
 struct OdometryResult {
   Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
@@ -55,9 +65,7 @@ struct OdometryResult {
   int iterations = 0;
   int edge_correspondences = 0;
   int plane_correspondences = 0;
-  /// Motion of the lidar during the sweep beyond what the points were compensated for: translation
-  /// [m] and rotation [rad] from its start to its end, along the lidar's axes in its middle.
-  Eigen::Matrix<double, 6, 1> sweep_correction = Eigen::Matrix<double, 6, 1>::Zero();
+  SweepCorrection sweep_correction = {};
   /// How well the scan lies on the local map: mean over all its features of a robust score of
   /// their distance, 0 for those without a counterpart, 1 for a perfect fit.
   double fit = 0.0;

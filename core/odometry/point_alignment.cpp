@@ -77,7 +77,7 @@ struct Equations {
 
 /// Points and where they are, some of which tell nothing but their height.
 struct AlignedPoints {
-  AlignedPoints(const FeatureSets& features, const PoseTangent& sweep_correction,
+  AlignedPoints(const FeatureSets& features, const SweepCorrection& sweep_correction,
                 const PointAlignmentConfig& config) {
     positions_lidar.reserve(features.points.size() + features.level_points.size());
     const auto add = [&](const FeaturePoint& point) {
@@ -165,7 +165,7 @@ Equations equations_of(const AlignedPoints& points, const FeatureMap& points_map
 
 PointAlignment align_points(const FeatureSets& features, const FeatureMap& points_map,
                             const Eigen::Isometry3d& T_map_lidar_start,
-                            const PoseTangent& sweep_correction,
+                            const SweepCorrection& sweep_correction,
                             const PointAlignmentConfig& config) {
   PointAlignment found{.T_map_lidar = T_map_lidar_start};
   const AlignedPoints points(features, sweep_correction, config);

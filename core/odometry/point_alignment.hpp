@@ -38,7 +38,7 @@ struct PointAlignment {
 /// for the motion within the sweep by `sweep_correction` beyond what they were.
 [[nodiscard]] PointAlignment align_points(const FeatureSets& features, const FeatureMap& points_map,
                                           const Eigen::Isometry3d& T_map_lidar_start,
-                                          const PoseTangent& sweep_correction = PoseTangent::Zero(),
+                                          const SweepCorrection& sweep_correction = {},
                                           const PointAlignmentConfig& config = {});
 
 }  // namespace stillmap

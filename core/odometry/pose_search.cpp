@@ -186,7 +186,7 @@ Eigen::Isometry3d align_points_around(const FeatureSets& features, const LocalMa
   some.points = every_nth(features.points, rough_points);
   some.level_points = every_nth(features.level_points, rough_points / 4);
   const auto aligned_from = [&](const Eigen::Isometry3d& T) {
-    return align_points(some, map.points, T, PoseTangent::Zero(), alignment);
+    return align_points(some, map.points, T, {}, alignment);
   };
   std::vector<PointAlignment> aligned(1 + alignment_rings * alignment_directions);
   tbb::parallel_for(std::size_t{0}, aligned.size(), [&](std::size_t start) {

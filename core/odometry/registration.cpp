@@ -3,17 +3,16 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
+#include "core/odometry/sweep_equations.hpp"
+
 namespace stillmap {
 namespace {
-
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 /// Neighbours are looked up again once the point has moved this far since [m]; nearer than that
 /// they are nearly always the same ones: the local map's points are 0.2 m apart.
@@ -114,27 +113,6 @@ class InformationSum {
   Eigen::Matrix<double, 8, 6> sum_ = Eigen::Matrix<double, 8, 6>::Zero();
 };
 
-/// J'WJ and J'We of eq. (13) over the correspondences whose residual is valid. A point's derivative
-/// by the sweep's motion (along the map's axes) is its sweep part times that by the pose.
-struct NormalEquations {
-  Matrix6d hessian = Matrix6d::Zero();
-  Matrix6d hessian_pose_sweep = Matrix6d::Zero();
-  Matrix6d hessian_sweep = Matrix6d::Zero();
-  PoseTangent gradient = PoseTangent::Zero();
-  PoseTangent gradient_sweep = PoseTangent::Zero();
-  double weighted_squares = 0.0;
-  double weights = 0.0;
-  double squared_ranges = 0.0;
-  /// Sum of the features' scores (OdometryResult::fit), and of those that lie on no level plane.
-  double scores = 0.0;
-  double upright_scores = 0.0;
-  int on_level_planes = 0;
-  int edges = 0;
-  int planes = 0;
-
-  [[nodiscard]] int count() const { return edges + planes; }
-};
-
 double geman_mcclure(double scale, double squared_distance) {
   if (scale == 0.0) return 1.0;
   const double ratio = scale * scale / (scale * scale + squared_distance);
@@ -157,6 +135,7 @@ NormalEquations build_normal_equations(std::span<const Correspondence> correspon
   NormalEquations equations;
   InformationSum hessian, hessian_pose_sweep, hessian_sweep;
   InformationSum::Slope slope = InformationSum::Slope::Zero();
+  InformationSum::Slope pose_bend = slope, twist_bend = slope;
   for (std::size_t i = 0; i < correspondences.size(); ++i) {
     const Correspondence& c = correspondences[i];
     if (!c.found) continue;
@@ -184,95 +163,24 @@ NormalEquations build_normal_equations(std::span<const Correspondence> correspon
       if (!rolling) continue;
       hessian_pose_sweep.add(c.sweep_part * w_k, slope);
       hessian_sweep.add(c.sweep_part * c.sweep_part * w_k, slope);
-      equations.gradient_sweep += c.sweep_part * pull * r.slopes[k];
+      equations.gradient_sweep.head<6>() += c.sweep_part * pull * r.slopes[k];
+      const double bend_slope = c.sweep_part * c.sweep_part * slope[5];
+      pose_bend += w_k * bend_slope * slope;
+      twist_bend += c.sweep_part * w_k * bend_slope * slope;
+      equations.hessian_sweep(bend_of_sweep, bend_of_sweep) += w_k * bend_slope * bend_slope;
+      equations.gradient_sweep[bend_of_sweep] += pull * bend_slope;
     }
     equations.weights += w * c.surface.weights[0];
     equations.squared_ranges += w * c.surface.weights[0] * c.point_lidar.squaredNorm();
     (i < edge_count ? equations.edges : equations.planes) += 1;
   }
   equations.hessian = hessian.matrix();
-  equations.hessian_pose_sweep = hessian_pose_sweep.matrix();
-  equations.hessian_sweep = hessian_sweep.matrix();
+  equations.hessian_pose_sweep << hessian_pose_sweep.matrix(), pose_bend.head<6>();
+  equations.hessian_sweep.topLeftCorner<6, 6>() = hessian_sweep.matrix();
+  equations.hessian_sweep.block<6, 1>(0, bend_of_sweep) = twist_bend.head<6>();
+  equations.hessian_sweep.block<1, 6>(bend_of_sweep, 0) = twist_bend.head<6>().transpose();
   return equations;
 }
-
-PoseTangent rotated(const Eigen::Matrix3d& R, const PoseTangent& tangent) {
-  PoseTangent result;
-  result.head<3>() = R.lazyProduct(tangent.head<3>());
-  result.tail<3>() = R.lazyProduct(tangent.tail<3>());
-  return result;
-}
-
-/// Residuals of a scan that fits, for the weight of the sweep's prior beside them [m].
-constexpr double expected_residual_m = 0.05;
-
-/// Neighbouring residuals err alike: beside the prior, all of a scan's count as this many.
-constexpr double independent_correspondences = 100.0;
-
-/// A turn that is not the one that points were compensated for began or ended at any moment of the
-/// sweep, whose rotation differs from that since the last pose by about this share of the change,
-/// and by no more than this [rad].
-constexpr double turn_change_share = 0.5;
-constexpr double max_turn_deviation_rad = 0.05;
-
-/// Error of a sweep's rotation that a gyro measured [rad].
-constexpr double measured_rotation_rad = 0.0005;
-
-/// Adds the prior of the motion within the sweep, along the map's axes.
-void add_sweep_prior(const SweepPrior& prior, const OdometryResult& at,
-                     const RegistrationConfig& config, NormalEquations& equations) {
-  const double correspondences = std::max(1.0, equations.weights);
-  // A rotation that was measured does not depend on where the pose turns out to be.
-  PoseTangent share = PoseTangent::Constant(prior.duration_share);
-  if (prior.rotation_is_measured) share.tail<3>().setZero();
-  PoseTangent change = PoseTangent::Zero();
-  if (prior.duration_share > 0.0) {
-    const Eigen::Isometry3d since_last = prior.T_map_lidar_last.inverse() * at.T_map_lidar;
-    change = share.cwiseProduct(twist_of(since_last)) - prior.compensated;
-    if (prior.rotation_is_measured) change.tail<3>().setZero();
-  }
-  const PoseTangent deviation = at.sweep_correction - change;
-  PoseTangent weight;
-  weight.head<3>().setConstant(std::pow(expected_residual_m / config.sweep_translation_m, 2));
-  const double turn_change_rad = std::abs(rotated(at.T_map_lidar.linear(), change)[5]);
-  const double turn_rad = std::min(turn_change_share * turn_change_rad, max_turn_deviation_rad);
-  Eigen::Vector3d rotation_rad(config.sweep_tilt_rad, config.sweep_tilt_rad,
-                               std::max(config.sweep_rotation_rad, turn_rad));
-  if (prior.rotation_is_measured) rotation_rad.setConstant(measured_rotation_rad);
-  weight.tail<3>() = (expected_residual_m * rotation_rad.cwiseInverse()).cwiseAbs2();
-  weight *= correspondences / independent_correspondences;
-  const PoseTangent weighted = weight.cwiseProduct(rotated(at.T_map_lidar.linear(), deviation));
-  equations.hessian_sweep.diagonal() += weight;
-  equations.hessian_pose_sweep.diagonal() -= share.cwiseProduct(weight);
-  equations.hessian.diagonal() += share.cwiseAbs2().cwiseProduct(weight);
-  equations.gradient_sweep += weighted;
-  equations.gradient -= share.cwiseProduct(weighted);
-}
-
-/// The sweep's motion taken out of the equations (Schur's complement).
-class SweepElimination {
- public:
-  explicit SweepElimination(const NormalEquations& equations) {
-    const Eigen::LDLT<Matrix6d> ldlt(equations.hessian_sweep);
-    by_pose_ = ldlt.solve(equations.hessian_pose_sweep.transpose());
-    constant_ = ldlt.solve(equations.gradient_sweep);
-  }
-
-  [[nodiscard]] NormalEquations reduced(NormalEquations equations) const {
-    equations.hessian -= equations.hessian_pose_sweep * by_pose_;
-    equations.hessian = 0.5 * (equations.hessian + equations.hessian.transpose()).eval();
-    equations.gradient -= equations.hessian_pose_sweep * constant_;
-    return equations;
-  }
-  /// Step of the sweep's motion along the map's axes.
-  [[nodiscard]] PoseTangent step(const PoseTangent& pose_step) const {
-    return -(constant_ + by_pose_ * pose_step);
-  }
-
- private:
-  Matrix6d by_pose_;
-  PoseTangent constant_;
-};
 
 /// The pose error along the eigenvectors of J'WJ. Rotation is scaled by the mean range, so that one
 /// unit of it moves points as far as one metre does, and an eigenvalue per unit of weight is the
@@ -347,13 +255,18 @@ bool take_step(const SweepPrior* sweep_prior, const RegistrationConfig& limits,
   const ErrorDirections directions(equations, limits.min_observability);
   const PoseTangent step = directions.step();
   PoseTangent sweep_step = PoseTangent::Zero();
+  double bend_step_rad = 0.0;
   if (sweep) {
-    const PoseTangent along_map = sweep->step(step);
-    sweep_step = rotated(result.T_map_lidar.linear().transpose(), along_map);
-    result.sweep_correction += sweep_step;
+    const SweepTangent along_map = sweep->step(step);
+    const Eigen::Matrix3d R_lidar_map = result.T_map_lidar.linear().transpose();
+    sweep_step = rotated(R_lidar_map, along_map.head<6>());
+    result.sweep_correction.twist += sweep_step;
+    bend_step_rad = along_map[bend_of_sweep];
+    result.sweep_correction.bend += bend_step_rad * R_lidar_map.col(2);
   }
   result.T_map_lidar = boxplus(result.T_map_lidar, step);
-  result.converged = is_small(step, 1.0, limits) && is_small(sweep_step, 2.0, limits);
+  result.converged = is_small(step, 1.0, limits) && is_small(sweep_step, 2.0, limits) &&
+                     std::abs(bend_step_rad) < 4.0 * limits.step_rotation_rad;
   return !directions.are_observed();
 }
 
@@ -399,10 +312,10 @@ OdometryResult lost_at(const Eigen::Isometry3d& T_map_lidar_predicted) {
 }
 
 Eigen::Vector3d compensated(const Eigen::Vector3d& point_lidar, double sweep_part,
-                            const PoseTangent& sweep_twist) {
+                            const SweepCorrection& motion) {
   if (sweep_part == 0.0) return point_lidar;
-  const Eigen::Vector3d t = sweep_part * sweep_twist.head<3>();
-  const Eigen::Vector3d r = sweep_part * sweep_twist.tail<3>();
+  const Eigen::Vector3d t = sweep_part * motion.twist.head<3>();
+  const Eigen::Vector3d r = sweep_part * (motion.twist.tail<3>() + sweep_part * motion.bend);
   const Eigen::Vector3d moved = t + r.cross(point_lidar);
   return point_lidar + moved + 0.5 * r.cross(moved);
 }
@@ -410,7 +323,7 @@ Eigen::Vector3d compensated(const Eigen::Vector3d& point_lidar, double sweep_par
 OdometryResult register_features(const FeatureSets& features, const LocalMap& map,
                                  const Eigen::Isometry3d& T_map_lidar_predicted,
                                  const OdometryConfig& config,
-                                 const PoseTangent& sweep_correction) {
+                                 const SweepCorrection& sweep_correction) {
   RegistrationConfig limits = config.registration;
   if (features.sparse_rings) {
     limits.neighbours = limits.sparse_ring_neighbours;

@@ -33,10 +33,10 @@ struct SweepPrior {
   bool rotation_is_measured = false;
 };
 
-/// The point of a lidar that moves by `sweep_twist` during its sweep, at the middle of the sweep;
-/// to second order: a tenth of a millimetre at 20 m for 2 degrees.
+/// The point of a lidar that moves by `motion` during its sweep, at the middle of the sweep; to
+/// second order: a tenth of a millimetre at 20 m for 2 degrees.
 [[nodiscard]] Eigen::Vector3d compensated(const Eigen::Vector3d& point_lidar, double sweep_part,
-                                          const PoseTangent& sweep_twist);
+                                          const SweepCorrection& motion);
 
 struct FeatureSets {
   std::vector<FeaturePoint> edges;
@@ -73,10 +73,10 @@ struct LocalMap {
 /// of eq. (10) frozen in each step of Gauss-Newton. Starts at `T_map_lidar_predicted` and returns
 /// it with health `lost` when the scan gives too few correspondences. Directions that the scan
 /// does not observe keep the prediction (health `degenerate`).
-[[nodiscard]] OdometryResult register_features(
-    const FeatureSets& features, const LocalMap& map,
-    const Eigen::Isometry3d& T_map_lidar_predicted, const OdometryConfig& config,
-    const PoseTangent& sweep_correction = PoseTangent::Zero());
+[[nodiscard]] OdometryResult register_features(const FeatureSets& features, const LocalMap& map,
+                                               const Eigen::Isometry3d& T_map_lidar_predicted,
+                                               const OdometryConfig& config,
+                                               const SweepCorrection& sweep_correction = {});
 
 /// The same in two stages: to convergence with weight 1 and no kernel, which would throw away
 /// exactly the residuals that a bad prediction makes, then to convergence with the weights.

@@ -137,13 +137,12 @@ FeatureSets downsampled(FeatureSets features) {
 }
 
 void extend_local_map(LocalMap& map, const FeatureSets& features,
-                      const Eigen::Isometry3d& T_map_lidar, const PoseTangent& sweep_twist) {
+                      const Eigen::Isometry3d& T_map_lidar, const SweepCorrection& motion) {
   const auto extend = [&](const std::vector<FeaturePoint>& from, FeatureMap& to) {
     std::vector<LabelledPoint> points;
     points.reserve(from.size());
     for (const FeaturePoint& f : from) {
-      const Eigen::Vector3d p =
-          compensated(f.position_lidar.cast<double>(), f.sweep_part, sweep_twist);
+      const Eigen::Vector3d p = compensated(f.position_lidar.cast<double>(), f.sweep_part, motion);
       points.push_back({(T_map_lidar * p).cast<float>(), f.label});
     }
     to.insert(points);

@@ -51,11 +51,10 @@ struct ScanInParts {
 /// Enough features to find a place by, and to tell which of several starts leads there.
 [[nodiscard]] FeatureSets downsampled(FeatureSets features);
 
-/// Adds edges and planes to the map, compensated for `sweep_twist` beyond what they were, and
+/// Adds edges and planes to the map, compensated for `motion` beyond what they were, and
 /// removes what is far from the lidar.
 void extend_local_map(LocalMap& map, const FeatureSets& features,
-                      const Eigen::Isometry3d& T_map_lidar,
-                      const PoseTangent& sweep_twist = PoseTangent::Zero());
+                      const Eigen::Isometry3d& T_map_lidar, const SweepCorrection& motion = {});
 
 /// A map for the coarse registration that holds one scan alone.
 [[nodiscard]] LocalMap coarse_map_of_scan(const FeatureSets& features,

@@ -53,6 +53,29 @@ void SweepMotion::move_to_middle(Scan& scan, const SweepTimes& sweep) const {
   });
 }
 
+Eigen::Isometry3d T_middle_at(const SweepCorrection& motion, double part) {
+  Eigen::Isometry3d T = motion_of(part * motion.twist);
+  T.rotate(so3_exp(part * part * motion.bend));
+  return T;
+}
+
+void move_to_middle(Scan& scan, const SweepTimes& sweep, const SweepCorrection& motion) {
+  if (sweep.duration_s <= 0.0) return;
+  if (!motion.bend.isZero()) {
+    const Eigen::Vector3f bend = motion.bend.cast<float>();
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scan.size(), 4096), [&](const auto& some) {
+      for (std::size_t i = some.begin(); i < some.end(); ++i) {
+        Eigen::Vector3f& point = scan.points_lidar[i];
+        const auto part = static_cast<float>(sweep.part(scan.time_offset_s[i]));
+        const Eigen::Vector3f r = part * part * bend;
+        const Eigen::Vector3f moved = r.cross(point);
+        point += moved + 0.5F * r.cross(moved);
+      }
+    });
+  }
+  deskew_to_middle(scan, sweep, motion_of(motion.twist));
+}
+
 Eigen::Isometry3d motion_to_stamp(const SweepTimes& sweep, const SweepMotion& motion,
                                   const Eigen::Isometry3d& T_earlier_later) {
   if (sweep.duration_s > 0.0) return motion.T_middle_at(-sweep.middle_s / sweep.duration_s);

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/lidar/prepare.hpp"
+#include "core/odometry/odometry_state.hpp"
 #include "core/odometry/se3.hpp"
 
 namespace stillmap {
@@ -32,6 +33,11 @@ class SweepMotion {
   PoseTangent twist_;
   std::vector<Eigen::Matrix3f> R_middle_at_;
 };
+
+/// Pose of the lidar at a part of the sweep in its frame at the middle.
+[[nodiscard]] Eigen::Isometry3d T_middle_at(const SweepCorrection& motion, double part);
+/// Moves every point to the middle of the sweep. Keeps the points' times.
+void move_to_middle(Scan& scan, const SweepTimes& sweep, const SweepCorrection& motion);
 
 /// From the middle of a sweep to its stamp. Where all points are of one time, that is the motion
 /// from the earlier of these two to the later.

@@ -64,6 +64,8 @@ INSTANTIATE_TEST_SUITE_P(
         FaultCase{"registration.min_correspondences",
                   [](C& c) { c.registration.min_correspondences = 5; }},
         FaultCase{"registration.sweep_tilt_rad", [](C& c) { c.registration.sweep_tilt_rad = 0.0; }},
+        FaultCase{"registration.sweep_bend_rad",
+                  [](C& c) { c.registration.sweep_bend_rad = -0.1; }},
         FaultCase{"registration.plane_deviation_m",
                   [](C& c) { c.registration.plane_deviation_m = -0.1; }},
         FaultCase{"registration.sparse_ring_plane_deviation_m",

@@ -71,8 +71,8 @@ TEST(AlignPoints, EndsWhereTheCostIsLeast) {
   PointAlignmentConfig config;
   config.step_translation_m = 1e-5;
   config.step_rotation_rad = 1e-6;
-  const PointAlignment found = align_points(cloud.features, cloud.map, level_pose(0.1, 0.0, 0.0),
-                                            PoseTangent::Zero(), config);
+  const PointAlignment found =
+      align_points(cloud.features, cloud.map, level_pose(0.1, 0.0, 0.0), {}, config);
   const double least = cost(cloud, found.T_map_lidar, config);
   for (int axis = 0; axis < 6; ++axis)
     for (const double step : {-0.02, 0.02}) {
@@ -112,8 +112,8 @@ TEST(AlignPoints, WithoutMovableOnesWhatDrivesAlongIsNoWitness) {
   EXPECT_LT(all.T_map_lidar.translation().x(), 0.1);
   // The cars in the map are neighbours like others: only nearly there.
   const PointAlignment fixed =
-      align_points(cloud.features, cloud.map, T_true * level_pose(0.05, 0.0, 0.0),
-                   PoseTangent::Zero(), {.without_movable = true});
+      align_points(cloud.features, cloud.map, T_true * level_pose(0.05, 0.0, 0.0), {},
+                   {.without_movable = true});
   expect_near(fixed.T_map_lidar, T_true, 0.1, 0.01);
 }
 

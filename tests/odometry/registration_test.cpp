@@ -107,6 +107,55 @@ TEST(RegisterFeatures, WhereTheScanIsNotHeardTheCovarianceIsThatOfTheGuess) {
   for (int k = 0; k < 3; ++k) EXPECT_NEAR(result.covariance(k, k), 1.0, 1e-9);
 }
 
+/// The features of a lidar whose beam goes round once while its turn of `turn_rad` a sweep swells:
+/// what it has turned by beyond a steady turn is `bend_rad` times the sweep's part squared.
+FeatureSets seen_in_a_swelling_turn(FeatureSets features, double turn_rad, double bend_rad) {
+  for (auto* points : {&features.edges, &features.planes, &features.surfaces}) {
+    for (FeaturePoint& f : *points) {
+      const double part = std::atan2(f.position_lidar.y(), f.position_lidar.x()) / 2.0 / M_PI;
+      const Eigen::AngleAxisd turned(part * part * bend_rad, Eigen::Vector3d::UnitZ());
+      f.position_lidar = (turned.inverse() * f.position_lidar.cast<double>()).cast<float>();
+      f.sweep_part = static_cast<float>(part);
+    }
+  }
+  features.rolling = true;
+  features.sweep_prior.compensated[5] = turn_rad;
+  return features;
+}
+
+TEST(RegisterFeatures, ATurnThatSwellsWithinTheSweepIsNotTakenForAStepAside) {
+  const SurfaceWorld world = courtyard();
+  const LocalMap map = world.local_map();
+  constexpr double bend_rad = 0.01;
+  const FeatureSets features =
+      seen_in_a_swelling_turn(world.features(T_true, 0.01, 1), 0.05, bend_rad);
+  const OdometryResult found = register_features(features, map, T_true, OdometryConfig{});
+  EXPECT_NEAR(found.sweep_correction.bend.z(), bend_rad, 0.2 * bend_rad);
+  expect_near(found.T_map_lidar, T_true, 0.01, 0.001);
+
+  OdometryConfig steady;
+  steady.registration.sweep_bend_rad = 0.0;
+  const OdometryResult as_steady = register_features(features, map, T_true, steady);
+  EXPECT_NEAR(as_steady.sweep_correction.bend.norm(), 0.0, 1e-6);
+  const auto off = [](const OdometryResult& result) {
+    return boxminus(result.T_map_lidar, T_true).norm();
+  };
+  EXPECT_LT(2.0 * off(found), off(as_steady));
+}
+
+TEST(RegisterFeatures, WhatTurnsSteadilyOrWasMeasuredIsHardlyBent) {
+  const SurfaceWorld world = courtyard();
+  const LocalMap map = world.local_map();
+  FeatureSets straight = seen_in_a_swelling_turn(world.features(T_true, 0.01, 1), 0.0, 0.0);
+  const OdometryResult found = register_features(straight, map, T_true, OdometryConfig{});
+  EXPECT_LT(found.sweep_correction.bend.norm(), 0.0005);
+
+  FeatureSets measured = seen_in_a_swelling_turn(world.features(T_true, 0.01, 1), 0.05, 0.01);
+  measured.sweep_prior.rotation_is_measured = true;
+  const OdometryResult kept = register_features(measured, map, T_true, OdometryConfig{});
+  EXPECT_LT(kept.sweep_correction.bend.norm(), 1e-6);
+}
+
 TEST(RegisterFeatures, TooFewCorrespondencesAreLostAtThePrediction) {
   const SurfaceWorld world = courtyard();
   FeatureSets few = world.features(T_true, 0.01, 3);

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
+#include "core/odometry/registration.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -53,6 +57,25 @@ TEST(SweepMotion, MeasuredRotationNeedNotBeSteady) {
   Scan scan = rolling_scan(motion);
   motion.move_to_middle(scan, sweep);
   expect_straight(scan);
+}
+
+TEST(SweepCorrectionTest, PointsAndPosesFollowTheSameBentMotion) {
+  SweepCorrection motion;
+  motion.twist << 0.5, 0.1, 0.0, 0.0, 0.01, 0.05;
+  motion.bend << 0.0, 0.0, 0.02;
+  Scan scan;
+  std::vector<Eigen::Vector3d> points_middle;
+  for (int k = 0; k <= 20; ++k) {
+    const double part = k / 20.0 - 0.5;
+    points_middle.emplace_back(10.0, 2.0 * k - 20.0, 1.0);
+    const Eigen::Vector3d seen = T_middle_at(motion, part).inverse() * points_middle.back();
+    EXPECT_LT((compensated(seen, part, motion) - points_middle.back()).norm(), 0.003) << k;
+    scan.points_lidar.push_back(seen.cast<float>());
+    scan.time_offset_s.push_back(0.005F * static_cast<float>(k));
+  }
+  move_to_middle(scan, sweep, motion);
+  expect_straight(scan);
+  EXPECT_TRUE(T_middle_at(motion, 0.0).isApprox(Eigen::Isometry3d::Identity()));
 }
 
 TEST(SweepMotion, GoesOnSteadilyBeyondTheSweep) {
