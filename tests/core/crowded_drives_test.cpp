@@ -145,7 +145,7 @@ TEST(CrowdedDrives, MapWhatWasSeenWhileThePlaceWasInDoubt) {
     entered = mapped->entered_before;
     if (odometry.map_entry == MapEntry::waits) {
       waiting_map.push_back(odometry.T_map_lidar.translation());
-    } else if (entered < 20) {
+    } else if (odometry.map_entry != MapEntry::stays_out && entered < 20) {
       waiting_map.clear();
     }
   }
