@@ -9,12 +9,13 @@
 
 namespace stillmap::server {
 
+/// Processor time of the calling thread, which stands still while the scheduler prefers others.
+[[nodiscard]] std::chrono::nanoseconds thread_cpu_time();
+
 /// When a background thread runs: beside all others, or on busy cores a tenth as much as those, by
 /// its nice value, or, by SCHED_IDLE, there only when no other thread wants to.
 enum class BackgroundScheduling { normal, low, idle };
 
-/// Processor time of the calling thread, which stands still while the scheduler prefers others.
-[[nodiscard]] std::chrono::nanoseconds thread_cpu_time();
 /// Applies it to the calling thread, for good. False where the system refuses.
 bool use_scheduling(BackgroundScheduling scheduling);
 /// Starts oneTBB's workers, which inherit the calling thread's scheduling and keep it: were a
