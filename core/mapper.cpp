@@ -228,6 +228,7 @@ bool Mapper::accepts(const Scan& scan) {
     return false;
   }
   if (trajectory_.empty() || clock_.accepts(scan.stamp_ns, trajectory_.back().stamp_ns)) {
+    follow_clock(scan.stamp_ns);
     // A clock that was set back: poses of times to come would stand between those to be added.
     while (!trajectory_.empty() && trajectory_.back().stamp_ns >= scan.stamp_ns)
       trajectory_.pop_back();
@@ -246,6 +247,16 @@ bool Mapper::accepts(const Scan& scan) {
   return false;
 }
 
+void Mapper::follow_clock(std::int64_t stamp_ns) {
+  if (trajectory_.empty() || stamp_ns > trajectory_.back().stamp_ns) return;
+  // The first scan by the new clock came a period after the last one by the old.
+  const std::int64_t last_ns =
+      clock_.first_doubtful_ns() - std::llround(config_.sensor.period_s * 1e9);
+  const std::int64_t shift_ns = last_ns - trajectory_.back().stamp_ns;
+  odometry_.set_clock(shift_ns);
+  if (last_middle_) last_middle_->stamp_ns += shift_ns;
+}
+
 bool ScanClock::accepts(std::int64_t stamp_ns, std::int64_t last_ns) {
   const auto follows = [stamp_ns](std::int64_t before_ns) {
     return stamp_ns > before_ns && stamp_ns - before_ns <= max_step_ns;
@@ -255,6 +266,7 @@ bool ScanClock::accepts(std::int64_t stamp_ns, std::int64_t last_ns) {
     return true;
   }
   doubtful_scans_ = doubtful_scans_ > 0 && follows(doubtful_ns_) ? doubtful_scans_ + 1 : 1;
+  if (doubtful_scans_ == 1) first_doubtful_ns_ = stamp_ns;
   doubtful_ns_ = stamp_ns;
   const int needed = stamp_ns > last_ns ? scans_after_jump : scans_after_step_back;
   if (doubtful_scans_ < needed) return false;

@@ -60,6 +60,8 @@ class ScanClock {
  public:
   /// `last_ns` is the stamp of the last scan that was accepted.
   [[nodiscard]] bool accepts(std::int64_t stamp_ns, std::int64_t last_ns);
+  /// The first of the scans on whose going on the last doubtful one was accepted.
+  [[nodiscard]] std::int64_t first_doubtful_ns() const { return first_doubtful_ns_; }
 
  private:
   static constexpr std::int64_t max_step_ns = 60'000'000'000;
@@ -67,6 +69,7 @@ class ScanClock {
   /// Stamps may come again and again for a moment, when a sender starts over.
   static constexpr int scans_after_step_back = 10;
 
+  std::int64_t first_doubtful_ns_ = 0;
   std::int64_t doubtful_ns_ = 0;
   int doubtful_scans_ = 0;
 };
@@ -201,6 +204,8 @@ class Mapper {
   /// were added when the lidar was close by.
   void add_prior_map_near(const Eigen::Vector3d& position_map);
   [[nodiscard]] bool accepts(const Scan& scan);
+  /// Before a scan that was accepted although its stamp is not after the last one.
+  void follow_clock(std::int64_t stamp_ns);
   [[nodiscard]] bool has_enough_points(const Scan& scan);
   /// The prior, or for the first scan of a new map the attitude that the IMU tells: map's z is up.
   [[nodiscard]] std::optional<Eigen::Isometry3d> levelled(

@@ -16,6 +16,9 @@ namespace {
 constexpr double max_periods = 2.0;
 /// Of a sweep, wherever the stamp is: from the median of its times.
 constexpr double max_periods_from_median = 1.25;
+/// A shorter sweep shows nothing of the motion within it: a car moves by less than its points are
+/// precise.
+constexpr double min_sweep_s = 0.002;
 constexpr std::size_t median_samples = 1000;
 
 class Usable {
@@ -168,7 +171,9 @@ SweepTimes sweep_times(const Scan& scan, double period_s) {
     last_s = any ? std::max<double>(last_s, t) : t;
     any = true;
   }
-  return {.middle_s = 0.5 * (first_s + last_s), .duration_s = last_s - first_s};
+  const double duration_s = last_s - first_s;
+  return {.middle_s = 0.5 * (first_s + last_s),
+          .duration_s = duration_s >= min_sweep_s ? duration_s : 0.0};
 }
 
 void deskew_to_middle(Scan& scan, const SweepTimes& sweep, const Eigen::Isometry3d& T_start_end) {

@@ -32,7 +32,7 @@ void turn_up(Scan& scan, double angle_rad);
 /// When a sweep was measured, relative to the scan's stamp [s].
 struct SweepTimes {
   double middle_s = 0.0;
-  /// From the first point to the last; 0: all at one instant, or no usable times.
+  /// From the first point to the last; 0: all at one instant (within 2 ms), or no usable times.
   double duration_s = 0.0;
 
   /// -0.5 at the start of the sweep, 0.5 at its end; 0 for a time that cannot be of this sweep.

@@ -51,13 +51,12 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   State& state = *state_;
   const std::int64_t time_ns = scan.stamp_ns + std::llround(sweep.middle_s * 1e9);
   const SweepMotion expected_motion = sweep_motion(sweep, inertial);
-  const auto T_middle_stamp = [&] {
-    return motion_to_stamp(sweep, expected_motion,
-                           state.last.motion_during(std::abs(sweep.middle_s)));
-  };
   std::optional<Eigen::Isometry3d> T_map_middle_known = T_map_lidar_prior;
   if (!state.started && !T_map_lidar_prior) T_map_middle_known = Eigen::Isometry3d::Identity();
-  if (T_map_middle_known) *T_map_middle_known = *T_map_middle_known * T_middle_stamp().inverse();
+  if (T_map_middle_known) {
+    *T_map_middle_known =
+        *T_map_middle_known * state.motion_to_stamp(sweep, expected_motion, {}).inverse();
+  }
   const PosePrediction prediction =
       state.predict(time_ns, T_map_middle_known, T_map_lidar_prior.has_value(), inertial);
 
@@ -88,9 +87,8 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
 
   // What users see is at the stamp: points and pose go there from the middle of the sweep.
   if (sweep.middle_s != 0.0) {
-    const double stamp_part = sweep.duration_s > 0.0 ? -sweep.middle_s / sweep.duration_s : 0.0;
     const Eigen::Isometry3d T =
-        T_middle_at(step.result.sweep_correction, stamp_part) * T_middle_stamp();
+        state.motion_to_stamp(sweep, expected_motion, step.result.sweep_correction);
     move_points(scan, T.inverse());
     step.result.T_map_lidar = step.result.T_map_lidar * T;
   }
@@ -114,6 +112,11 @@ void Odometry::begin_in(PriorMap prior) {
   state.map = std::move(prior.local_map);
   if (!state.is_by_surfaces) state.ring_start.set_prior_map(prior.points_map);
   state.prior_map = std::move(prior.points_map);
+}
+
+void Odometry::set_clock(std::int64_t shift_ns) {
+  state_->intervals.set_clock(shift_ns);
+  if (state_->stretch) state_->stretch->set_clock(shift_ns);
 }
 
 void Odometry::reset() { *state_ = State(state_->first_config, state_->sensor); }

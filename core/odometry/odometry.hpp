@@ -68,6 +68,9 @@ class Odometry {
   /// one began.
   void begin_in(PriorMap prior);
 
+  /// The clock of the stamps was set: what was stamped before has a stamp so much later by it.
+  void set_clock(std::int64_t shift_ns);
+
   /// Forgets poses and local map.
   void reset();
 

@@ -133,6 +133,7 @@ OdometryConfig OdometryConfig::with_method() const {
     used.motion.use_range_image_history = false;
     used.registration.across_rings_weight = 1.0;
     used.registration.max_extrapolation = 0.0;
+    used.registration.sweep_bend_rad = 0.0;
   }
   return used;
 }

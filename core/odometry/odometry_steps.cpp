@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_invoke.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -33,6 +34,17 @@ Eigen::Isometry3d Odometry::State::motion_to_middle(
   PoseTangent twist = twist_of(T_last_middle);
   twist.tail<3>() = so3_log(inertial->R_last_middle);
   return motion_of(twist);
+}
+
+Eigen::Isometry3d Odometry::State::motion_to_stamp(const SweepTimes& sweep,
+                                                   const SweepMotion& compensated,
+                                                   const SweepCorrection& correction) const {
+  const double part =
+      sweep.duration_s > 0.0 ? std::clamp(-sweep.middle_s / sweep.duration_s, -0.5, 0.5) : 0.0;
+  const double beyond_s = -sweep.middle_s - part * sweep.duration_s;
+  const Eigen::Isometry3d T_beyond = last.motion_during(std::abs(beyond_s));
+  return T_middle_at(correction, part) * compensated.T_middle_at(part) *
+         (beyond_s < 0.0 ? T_beyond.inverse() : T_beyond);
 }
 
 PosePrediction Odometry::State::predict(std::int64_t time_ns,
@@ -144,8 +156,8 @@ void Odometry::State::update_state(std::int64_t stamp_ns, std::optional<RangeIma
     has_jumped = !is_reachable(last, T_map_lidar_now, interval_s, last.interval_s > 0.0,
                                sensor.motion_limits);
     last.motion = last.T_map_lidar.inverse() * T_map_lidar_now;
-    last.interval_s = interval_s;
     intervals.add(stamp_ns);
+    last.interval_s = intervals.last_interval_s();
   } else {
     intervals.begin(stamp_ns);
   }
@@ -166,7 +178,11 @@ void Odometry::State::straighten(const FeatureSets& features, std::int64_t time_
                                  const SweepTimes& sweep, OdometryResult& second) {
   if (!first_scan) return;
   const FirstScan first = *std::exchange(first_scan, std::nullopt);
-  const double interval_s = intervals.stamped_since_last_s(time_ns);
+  // A rolling lidar's sweeps follow each other: stamps that say less are wrong.
+  constexpr double min_sweeps = 0.9;
+  const double stamped_s = intervals.stamped_since_last_s(time_ns);
+  const double interval_s =
+      stamped_s > min_sweeps * sweep.duration_s ? stamped_s : intervals.since_last_s(time_ns);
   if (second.health == OdometryHealth::lost || interval_s > max_prediction_s || !features.rolling)
     return;
   straighten_first_scan(first, features, interval_s, sweep, method(),

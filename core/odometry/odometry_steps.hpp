@@ -65,6 +65,11 @@ struct Odometry::State {
   /// By the last motion since that pose, turned as the IMU says.
   [[nodiscard]] Eigen::Isometry3d motion_to_middle(
       double interval_s, const std::optional<InertialMotion>& inertial) const;
+  /// From the middle of a sweep to its stamp: within the sweep by its own motion, before and after
+  /// it by the last motion, since what a short sweep tells of its own does not reach far.
+  [[nodiscard]] Eigen::Isometry3d motion_to_stamp(const SweepTimes& sweep,
+                                                  const SweepMotion& compensated,
+                                                  const SweepCorrection& correction) const;
   /// Where a scan is, by a prior or the map's origin, else by the last motion.
   [[nodiscard]] PosePrediction predict(std::int64_t time_ns,
                                        const std::optional<Eigen::Isometry3d>& T_map_lidar_known,

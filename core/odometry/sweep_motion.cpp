@@ -76,10 +76,4 @@ void move_to_middle(Scan& scan, const SweepTimes& sweep, const SweepCorrection& 
   deskew_to_middle(scan, sweep, motion_of(motion.twist));
 }
 
-Eigen::Isometry3d motion_to_stamp(const SweepTimes& sweep, const SweepMotion& motion,
-                                  const Eigen::Isometry3d& T_earlier_later) {
-  if (sweep.duration_s > 0.0) return motion.T_middle_at(-sweep.middle_s / sweep.duration_s);
-  return sweep.middle_s < 0.0 ? T_earlier_later : T_earlier_later.inverse();
-}
-
 }  // namespace stillmap

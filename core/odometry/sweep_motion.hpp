@@ -39,9 +39,4 @@ class SweepMotion {
 /// Moves every point to the middle of the sweep. Keeps the points' times.
 void move_to_middle(Scan& scan, const SweepTimes& sweep, const SweepCorrection& motion);
 
-/// From the middle of a sweep to its stamp. Where all points are of one time, that is the motion
-/// from the earlier of these two to the later.
-[[nodiscard]] Eigen::Isometry3d motion_to_stamp(const SweepTimes& sweep, const SweepMotion& motion,
-                                                const Eigen::Isometry3d& T_earlier_later);
-
 }  // namespace stillmap

@@ -53,6 +53,8 @@ class UnconfirmedStretch {
 
   /// Points that were stored before the stretch, and are near only now.
   void add_prior_map(std::span<const LabelledPoint> points_map);
+  /// See ScanIntervals::set_clock().
+  void set_clock(std::int64_t shift_ns) { trusted_.intervals.set_clock(shift_ns); }
   [[nodiscard]] const Trusted& trusted() const { return trusted_; }
   [[nodiscard]] bool has_jumped() const { return has_jumped_; }
   /// Ends the stretch.

@@ -113,6 +113,47 @@ TEST(HardDrives, TurnsThatChangeWithinARollingSweepAreFollowed) {
   EXPECT_LE(worst_turn_rad(config, poses, 3), 0.008);
 }
 
+TEST(HardDrives, AFirstStampThatIsLateDoesNotBendARollingMap) {
+  SimulationConfig config = yard(LidarMotion::vehicle, true);
+  config.sensor = vlp_16();
+  config.firings = 0;
+  config.scans = 16;
+  const Simulation simulation(config);
+  Mapper mapper = mapper_of(config);
+  for (int k = 0; k < config.scans; ++k) {
+    Scan scan = simulation.scan(k).scan;
+    if (k == 0) scan.stamp_ns += 80'000'000;
+    const auto mapped = mapper.process(std::move(scan));
+    ASSERT_TRUE(mapped);
+    EXPECT_NE(mapped->odometry.health, OdometryHealth::lost) << "scan " << k;
+    const Eigen::Isometry3d T_true = simulation.T_map_lidar_at(0.0).inverse() *
+                                     simulation.T_map_lidar_at(k * config.sensor.period_s);
+    const Eigen::Isometry3d off = T_true.inverse() * mapped->odometry.T_map_lidar;
+    EXPECT_LE(off.translation().norm(), 0.2) << "scan " << k;
+  }
+}
+
+/// Until the new clock is believed it drives farther than a lidar can within a period.
+TEST(HardDrives, AClockThatIsSetBackWhileDrivingLosesNothing) {
+  SimulationConfig config = yard(LidarMotion::vehicle, false);
+  config.scans = 60;
+  const Simulation simulation(config);
+  Mapper mapper = mapper_of(config);
+  const auto T_map_lidar_at = [&](int k) { return simulation.T_map_lidar_at(0.2 * k); };
+  EXPECT_GT((T_map_lidar_at(14).inverse() * T_map_lidar_at(24)).translation().norm(), 12.0);
+  for (int k = 0; k < 30; ++k) {
+    Scan scan = simulation.scan(2 * k).scan;
+    if (k >= 15) scan.stamp_ns -= 3'600'000'000'000;
+    const auto mapped = mapper.process(std::move(scan));
+    EXPECT_EQ(mapped.has_value(), k < 15 || k >= 24) << "scan " << k;
+    if (!mapped || k < 15) continue;
+    EXPECT_NE(mapped->odometry.health, OdometryHealth::lost) << "scan " << k;
+    const Eigen::Isometry3d off =
+        (T_map_lidar_at(0).inverse() * T_map_lidar_at(k)).inverse() * mapped->odometry.T_map_lidar;
+    EXPECT_LE(off.translation().norm(), 0.1) << "scan " << k;
+  }
+}
+
 TEST(HardDrives, AMapBegunOnTheWayIsFollowedFromItsFirstRollingScanOn) {
   SimulationConfig config = yard(LidarMotion::hard_turns, true);
   const Simulation simulation(config);

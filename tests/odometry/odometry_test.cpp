@@ -199,6 +199,42 @@ TEST_F(OdometrySequence, PosesAreAtTheStampWhenAllPointsAreOfAnotherTime) {
   }
 }
 
+/// Poses at stamps `late_scans` after scans whose points were measured within `sweep_s`, in no
+/// order.
+std::vector<Eigen::Isometry3d> poses_of_short_sweeps(const BoxSequence& sequence, float sweep_s,
+                                                     double late_scans) {
+  Odometry odometry(OdometryConfig{}, test::test_lidar());
+  std::vector<Eigen::Isometry3d> poses;
+  for (const test::BoxScan& seen : sequence.scans) {
+    Scan scan = seen.scan;
+    scan.stamp_ns += std::llround(0.1e9 * late_scans);
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+      const auto part = static_cast<float>(i * 7919 % 1000) / 1000.0F - 0.5F;
+      scan.time_offset_s.push_back(sweep_s * part - static_cast<float>(0.1 * late_scans));
+    }
+    const SweepTimes sweep = sweep_times(scan, 0.1);
+    poses.push_back(
+        odometry.register_scan(scan, sweep, seen.labels(), std::nullopt).result.T_map_lidar);
+  }
+  return poses;
+}
+
+// Points that differ by some milliseconds tell nothing of the tenth of a second to the stamp.
+TEST_F(OdometrySequence, PosesAreAtTheStampWhenTheSweepIsShort) {
+  constexpr std::size_t first = 3;
+  for (const float sweep_s : {0.0005F, 0.004F}) {
+    for (const double late_scans : {1.0, -1.0}) {
+      const auto poses = poses_of_short_sweeps(quiet(), sweep_s, late_scans);
+      const auto truth = [&](std::size_t k) {
+        return BoxSequence::T_map_lidar_at(static_cast<double>(k) + late_scans);
+      };
+      for (std::size_t k = first + 1; k < poses.size(); ++k)
+        expect_near(poses[first].inverse() * poses[k], truth(first).inverse() * truth(k), 0.15,
+                    0.01);
+    }
+  }
+}
+
 TEST_F(OdometrySequence, FindsTheFirstMotionOfAFastStart) {
   // 54 km/h: farther in a scan than a plane's neighbours are looked for.
   for (const double ahead_m : {1.5, -1.5}) {

@@ -53,5 +53,47 @@ TEST(ScanIntervals, AreTheStampsOfASensorThatKeepsNoPeriod) {
   EXPECT_DOUBLE_EQ(intervals.since_last_s(stamp_ns + 340 * ms_ns), 0.34);
 }
 
+TEST(ScanIntervals, GoOnByAClockThatWasSet) {
+  ScanIntervals intervals = even_scans();
+  const std::int64_t hour_back_ns = -3'600'000 * ms_ns;
+  intervals.set_clock(hour_back_ns);
+  EXPECT_DOUBLE_EQ(intervals.since_last_s(hour_back_ns + 3000 * ms_ns), 1.0);
+  EXPECT_DOUBLE_EQ(intervals.last_interval_s(), 0.1);
+}
+
+TEST(ScanIntervals, AreAboveZeroWhateverTheStamp) {
+  ScanIntervals fast(0.1);
+  fast.begin(0);
+  for (int k = 1; k <= 40; ++k) fast.add(50 * k * ms_ns);
+  for (const ScanIntervals& intervals : {even_scans(), fast}) {
+    EXPECT_GT(intervals.since_last_s(2000 * ms_ns), 0.0);
+    EXPECT_GT(intervals.since_last_s(-3'600'000 * ms_ns), 0.0);
+  }
+}
+
+TEST(ScanIntervals, AGapSaysNothingOfStampsThatScatter) {
+  ScanIntervals intervals(0.1);
+  intervals.begin(0);
+  const auto add_from = [&](std::int64_t begin_ms) {
+    for (int k = 1; k <= 40; ++k)
+      intervals.add((begin_ms + 100 * k + (k % 2 == 0 ? 40 : -40)) * ms_ns);
+  };
+  add_from(0);
+  add_from(64'000);
+  EXPECT_DOUBLE_EQ(intervals.since_last_s((64'000 + 4060) * ms_ns), 0.1);
+}
+
+// Else the motion that is expected halves in the scan from which on the stamps are believed.
+TEST(ScanIntervals, OfTheLastScansAreByTheSameRuleAsTheNext) {
+  ScanIntervals intervals(0.1);
+  intervals.begin(0);
+  EXPECT_EQ(intervals.last_interval_s(), 0.0);
+  for (int k = 1; k <= 40; ++k) {
+    intervals.add(50 * k * ms_ns);
+    EXPECT_NEAR(intervals.last_interval_s(), intervals.since_last_s(50 * (k + 1) * ms_ns), 1e-9)
+        << "scan " << k;
+  }
+}
+
 }  // namespace
 }  // namespace stillmap
