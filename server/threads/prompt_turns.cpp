@@ -16,7 +16,7 @@ bool PromptBudget::has_time() {
 void PromptBudget::spend(std::chrono::nanoseconds processor_time) {
   const std::scoped_lock lock(mutex_);
   fill();
-  left_ = std::max(left_ - processor_time, -limits_.burst);
+  left_ = std::max(left_ - processor_time, -limits_.debt);
 }
 
 void PromptBudget::fill() {

@@ -19,6 +19,8 @@ class PromptBudget {
  public:
   struct Limits {
     std::chrono::nanoseconds burst = std::chrono::milliseconds(500);
+    /// What answers that took longer than they were thought to may owe: more is forgotten.
+    std::chrono::nanoseconds debt = std::chrono::seconds(15);
     /// Processor seconds a second.
     double cores = 0.25;
   };
@@ -28,7 +30,7 @@ class PromptBudget {
       : limits_(limits), clock_(clock), left_(limits.burst), filled_(clock.now()) {}
 
   [[nodiscard]] bool has_time();
-  /// One answer may overdraw it, by `burst` at most: what took longer is forgotten.
+  /// Answers that are under way may overdraw it, down to `debt`.
   void spend(std::chrono::nanoseconds processor_time);
 
  private:

@@ -40,7 +40,7 @@ class PromptTurnsTest : public ::testing::Test {
   }
 
   test::ManualClock clock_;
-  PromptBudget budget_{{.burst = 20ms, .cores = 0.25}, clock_};
+  PromptBudget budget_{{.burst = 20ms, .debt = 200ms, .cores = 0.25}, clock_};
   PromptTurns turns_{budget_, "turns"};
 };
 
@@ -61,9 +61,14 @@ TEST_F(PromptTurnsTest, TimeComesBackBySharesOfACore) {
   EXPECT_TRUE(budget_.has_time());
 }
 
-TEST_F(PromptTurnsTest, OneLongAnswerIsForgotten) {
+TEST_F(PromptTurnsTest, ALongAnswerIsPaidForDownToABound) {
+  budget_.spend(120ms);
+  clock_.advance(390ms);
+  EXPECT_FALSE(budget_.has_time());
+  clock_.advance(20ms);
+  EXPECT_TRUE(budget_.has_time());
   budget_.spend(1h);
-  clock_.advance(84ms);
+  clock_.advance(810ms);
   EXPECT_TRUE(budget_.has_time());
 }
 
