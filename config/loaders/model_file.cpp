@@ -34,10 +34,12 @@ void read_channel(YamlSection section, InputStatistics& statistics, std::size_t 
 }
 
 void read_statistics(YamlSection section, InputStatistics& statistics) {
-  std::vector<std::string> channels{"range", "x", "y", "z", "remission"};
+  const auto plain_end = input_channel_names.begin() + plain_input_channels;
+  std::vector<std::string> channels(input_channel_names.begin(), plain_end);
   section.require(channels);
-  // Channels beyond RangeNet++'s.
-  if (section.has("slope")) channels.emplace_back("slope");
+  for (auto name = plain_end; name != input_channel_names.end(); ++name) {
+    if (section.has(std::string(*name))) channels.emplace_back(*name);
+  }
   statistics.channels = channels.size();
   for (std::size_t i = 0; i < channels.size(); ++i) {
     read_channel(section.section(channels[i]), statistics, i);

@@ -12,8 +12,6 @@
 namespace stillmap {
 namespace {
 
-constexpr std::array<std::string_view, max_input_channels> channel_names{
-    "range", "x", "y", "z", "remission", "slope"};
 constexpr int max_rows = 512;
 /// Lidars of few beams fire some 1800 times per revolution (VLP-16 at 10 Hz), others 2100 times and
 /// more. An image with more columns than that has empty ones everywhere, unlike all training
@@ -24,7 +22,7 @@ constexpr int columns_of_few_beams = 1536;
 std::string statistics_faults(const InputStatistics& statistics) {
   std::string faults;
   for (std::size_t i = 0; i < statistics.channels; ++i) {
-    const std::string channel(channel_names[i]);
+    const std::string channel(input_channel_names[i]);
     if (!std::isfinite(statistics.mean[i])) {
       faults += "mean of " + channel + " is not a finite number\n";
     }

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/lidar/range_image.hpp"
@@ -26,6 +27,9 @@ enum class InputChannel : std::uint8_t {
   slope,      ///< [rad]; see surface_slope_rad()
 };
 inline constexpr std::size_t max_input_channels = 6;
+/// As model.yaml and the training scripts call them.
+inline constexpr std::array<std::string_view, max_input_channels> input_channel_names{
+    "range", "x", "y", "z", "remission", "slope"};
 /// RangeNet++'s: without the slope.
 inline constexpr std::size_t plain_input_channels = 5;
 

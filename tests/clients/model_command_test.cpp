@@ -42,6 +42,7 @@ TEST_F(ModelCommandTest, InfoSaysWhatItIsAndWhatRunsIt) {
   const ProcessResult result = model("info " + path("model") + " --steps");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, AllOf(HasSubstr("tiny"), HasSubstr("16x64"), HasSubstr("not calibrated"),
+                                HasSubstr("channels  range, x, y, z, remission\n"),
                                 HasSubstr("oneDNN fp32"), HasSubstr("convolve 5 to 8")));
 }
 

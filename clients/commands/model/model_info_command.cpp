@@ -17,6 +17,14 @@ struct InfoArguments {
   bool steps = false;
 };
 
+std::string channels_in_words(std::size_t count) {
+  std::string words;
+  for (std::size_t i = 0; i < count; ++i) {
+    words += (i > 0 ? ", " : "") + std::string(input_channel_names[i]);
+  }
+  return words;
+}
+
 void print_description(const ModelDescription& model) {
   const auto line = [](const char* what, const std::string& text) {
     if (!text.empty()) std::cout << what << text << "\n";
@@ -31,6 +39,7 @@ void print_description(const ModelDescription& model) {
   line("image     ", std::to_string(model.rows) + "x" + std::to_string(model.columns) +
                          (model.min_columns > 0 ? ", down to " + least + " columns" : "") +
                          (model.follow_sensor ? ", rows as the sensor has rings" : ""));
+  line("channels  ", channels_in_words(model.statistics.channels));
   line("outputs   ", std::to_string(model.classes.size()));
   line("int8      ", model.int8 ? "calibrated: " + model.int8->made : "not calibrated");
 }
