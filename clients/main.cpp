@@ -1,3 +1,5 @@
+#include <csignal>
+
 #include "clients/commands/command.hpp"
 #include "config/loaders/openmp_waits.hpp"
 #include "idl/dds/dds_log.hpp"
@@ -5,6 +7,8 @@
 int main(int argc, char** argv) {
   stillmap::shorten_openmp_waits(argv);
   stillmap::dds::log_dds_to_stderr();
+  // At a limit of file sizes, writing fails as on a full disk, instead of ending the program.
+  static_cast<void>(std::signal(SIGXFSZ, SIG_IGN));
   stillmap::cli::CommandLine command_line("stillmap", STILLMAP_VERSION,
                                           "Lidar scans in, poses and a static semantic map out.");
   stillmap::cli::Action action;

@@ -6,10 +6,13 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <limits>
 #include <system_error>
+#include <thread>
 
 #include "core/process/stop_signals.hpp"
+#include "core/process/temporary_folder.hpp"
 
 namespace stillmap::cli {
 
@@ -26,6 +29,18 @@ bool StopSignal::wait_for(std::chrono::milliseconds timeout) {
   pollfd waiting{.fd = signal_fd_, .events = POLLIN, .revents = 0};
   constexpr std::chrono::milliseconds::rep max_ms = std::numeric_limits<int>::max();
   return poll(&waiting, 1, static_cast<int>(std::min(timeout.count(), max_ms))) > 0;
+}
+
+void end_cleanly_when_stopped() {
+  const sigset_t signals = block_stop_signals();
+  std::thread([signals] {
+    int signal = 0;
+    if (sigwait(&signals, &signal) != 0) return;
+    TemporaryFolder::remove_all_at_end();
+    static_cast<void>(std::signal(signal, SIG_DFL));
+    pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
+    raise(signal);
+  }).detach();
 }
 
 }  // namespace stillmap::cli

@@ -22,4 +22,9 @@ class StopSignal {
   int signal_fd_ = -1;
 };
 
+/// Lets these signals end the process as ever, but not before its temporary folders
+/// (TemporaryFolder) are removed. For commands that cannot end their run in order; to be called
+/// before any thread starts, and not along with a StopSignal.
+void end_cleanly_when_stopped();
+
 }  // namespace stillmap::cli

@@ -18,19 +18,30 @@ namespace fs = std::filesystem;
 constexpr std::size_t max_name_bytes = 200;
 
 /// Of the files that stand beside a map file while it is used.
-constexpr std::array<std::string_view, 7> reserved_endings{"-wal",   "-shm",  "-journal", ".new",
-                                                           ".empty", ".lock", ".other"};
+constexpr std::array<std::string_view, 5> reserved_endings{"-wal", "-shm", "-journal", ".lock",
+                                                           ".other"};
 
-/// No path, nothing that SQLite, a shell or another system would read as more than a name.
-bool is_plain_name(const std::string& name) {
+/// What is wrong with a name that is no path, and nothing that SQLite, a shell or another system
+/// would read as more than a name; empty for a plain one.
+std::string fault_of_name(const std::string& name) {
   const auto is_special = [](unsigned char c) {
     return c < ' ' || c == 127 ||
            std::string_view("/\\:?*%\"<>|").find(static_cast<char>(c)) != std::string_view::npos;
   };
   const auto ends_as = [&](std::string_view ending) { return name.ends_with(ending); };
-  return !name.empty() && name.size() <= max_name_bytes && name.front() != '.' &&
-         name.front() != '-' && std::ranges::none_of(name, is_special) &&
-         std::ranges::none_of(reserved_endings, ends_as);
+  if (name.empty() || name.front() == '.' || name.front() == '-' ||
+      std::ranges::any_of(name, is_special)) {
+    return "must be a plain name, without any of / \\ : ? * % \" < > | and not beginning with . or "
+           "-; it is looked for beside the configured map file";
+  }
+  if (name.size() > max_name_bytes) {
+    return "has " + std::to_string(name.size()) + " bytes; choose a plain name of " +
+           std::to_string(max_name_bytes) + " at most";
+  }
+  const auto ending = std::ranges::find_if(reserved_endings, ends_as);
+  if (ending == reserved_endings.end()) return {};
+  return "ends in " + std::string(*ending) +
+         ", as files do that stand beside a map file while it is used; choose another plain name";
 }
 
 std::string local_time() {
@@ -49,12 +60,8 @@ MapFolder::MapFolder(const fs::path& map_file, const SavedMapsLimit& limit)
       limit_(limit) {}
 
 fs::path MapFolder::file_named(const std::string& name) const {
-  if (!is_plain_name(name)) {
-    throw std::invalid_argument("file '" + name +
-                                "' must be a plain name, without any of / \\ : ? * % \" < > | and "
-                                "not beginning with . or -; it is looked for beside the "
-                                "configured map file");
-  }
+  if (const std::string fault = fault_of_name(name); !fault.empty())
+    throw std::invalid_argument("file '" + name + "' " + fault);
   const fs::path file = folder_ / name;
   std::error_code error;
   if (fs::weakly_canonical(file, error).parent_path() != fs::weakly_canonical(folder_, error)) {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/map/map_id.hpp"
+#include "core/map/storage/fresh_map_file.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -346,10 +347,10 @@ NewMap MapSaver::begin_anew(bool discard, const BeginMap& begin) {
 
 std::shared_ptr<MovableTileStore> MapSaver::put_aside(const fs::path& kept) {
   open_store().complete_file();
-  const fs::path fresh = file_.string() + ".empty";
+  std::optional<FreshMapFile> fresh;
   try {
-    fs::remove(fresh);
-    static_cast<void>(open_map_file(fresh));
+    fresh.emplace(file_);
+    static_cast<void>(open_map_file(fresh->path()));
     // Tiles of the old map may still be read through connections that are open: they keep its
     // file and its log, which is empty, whatever their names are.
     store_.reset();
@@ -359,7 +360,7 @@ std::shared_ptr<MovableTileStore> MapSaver::put_aside(const fs::path& kept) {
                                   error.what() + "); its folder must be writable");
   }
   try {
-    replace_map_file(fresh, file_);
+    replace_map_file(fresh->path(), file_);
     is_session_ = false;
     return tiles_of(open_store());
   } catch (const MapFileError&) {

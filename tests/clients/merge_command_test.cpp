@@ -1,8 +1,12 @@
+#include <signal.h>
+
 #include "core/map/storage/map_file.hpp"
 #include "tests/clients/command_test.hpp"
 
 namespace stillmap::test {
 namespace {
+
+namespace fs = std::filesystem;
 
 /// Two maps of one drive: of its first and its last part, which share some of the way.
 class MergeCommandTest : public CommandTest {
@@ -83,6 +87,34 @@ TEST_F(MergeCommandTest, NamesWhatItCannotMerge) {
   const std::string both = "merge " + map("a") + " " + map("b") + " --out ";
   EXPECT_THAT(run(both + path("there.stillmap")).err, HasSubstr("exists already"));
   EXPECT_THAT(run(both + map("b") + " --force").err, HasSubstr("stay as they are"));
+  const ProcessResult nowhere = run(both + path("none/c.stillmap"));
+  EXPECT_EQ(nowhere.exit_code, 2);
+  EXPECT_THAT(nowhere.err, HasSubstr("cannot be locked"));
+  const ProcessResult folder = run(both + path("a") + " --force");
+  EXPECT_EQ(folder.exit_code, 2);
+  EXPECT_THAT(folder.err, HasSubstr("is not a file"));
+}
+
+TEST_F(MergeCommandTest, KeepsToItsOwnFilesAndIsAloneWithThem) {
+  fs::create_directory(folder_ / "tmp");
+  const fs::path other = folder_ / "c.stillmap.merged";
+  fs::copy_file(map("b"), other);
+  const std::string merge = "merge " + map("a") + " " + other.string() + " --out ";
+  const std::string in_tmp = "env TMPDIR=" + path("tmp") + " " + stillmap_program() + " " + merge;
+  BackgroundProcess first(in_tmp + path("c.stillmap"), folder_ / "log");
+  ASSERT_TRUE(eventually([&] { return exists("c.stillmap.lock"); }));
+  const ProcessResult second = run(merge + path("c.stillmap"));
+  EXPECT_EQ(second.exit_code, 2);
+  EXPECT_THAT(second.err, HasSubstr("is in use by process"));
+  EXPECT_EQ(first.wait(), 0) << content("log");
+  EXPECT_EQ(content("c.stillmap.merged"), content("b/map.stillmap"));
+
+  BackgroundProcess stopped(in_tmp + path("d.stillmap"), folder_ / "log");
+  ASSERT_TRUE(eventually([&] { return !fs::is_empty(folder_ / "tmp"); }));
+  stopped.send(SIGINT);
+  EXPECT_EQ(stopped.wait(), -1) << "as by a signal that nobody waits for";
+  EXPECT_TRUE(fs::is_empty(folder_ / "tmp"));
+  EXPECT_FALSE(exists("d.stillmap"));
 }
 
 }  // namespace

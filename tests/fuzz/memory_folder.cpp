@@ -39,7 +39,7 @@ std::filesystem::path MemoryFolder::file(const std::string& name, const std::str
 }
 
 void MemoryFolder::remove(const std::string& name) const {
-  for (const char* ending : {"", "-wal", "-shm", "-journal", ".new", ".new-journal"}) {
+  for (const char* ending : {"", "-wal", "-shm", "-journal"}) {
     std::error_code none_there;
     std::filesystem::remove(folder_ / (name + ending), none_there);
   }

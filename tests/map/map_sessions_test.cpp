@@ -371,5 +371,17 @@ TEST_F(MapSessionsTest, ACheckLooksAtWhatAWithdrawalWouldBringBack) {
   EXPECT_TRUE(check_map_file(file_).is_sound());
 }
 
+TEST_F(MapSessionsTest, AreWithdrawnFromAFileWhateverItsName) {
+  add_session("tuesday", 9, 1.0F);
+  for (const char* name : {"out.stillmap.new", "out.stillmap.new-journal"}) {
+    const fs::path file = folder_ / name, out = folder_ / "out.stillmap";
+    fs::copy_file(file_, file);
+    withdraw_newest_session(file, out);
+    ASSERT_TRUE(fs::exists(file)) << name;
+    EXPECT_EQ(bytes_of(file), bytes_of(file_)) << name;
+    EXPECT_EQ(read_map_sessions(out).size(), 1U) << name;
+  }
+}
+
 }  // namespace
 }  // namespace stillmap

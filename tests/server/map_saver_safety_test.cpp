@@ -255,8 +255,9 @@ TEST_F(MapSaverSafetyTest, ACopyThatCannotBeMadeIsNoSuccess) {
   MapSaver saver = this->saver();
   saver.set_source(source_);
   map_scan(5.0F);
-  fs::create_directory(folder_ / "copy.stillmap.new");
-  std::ofstream(folder_ / "copy.stillmap.new" / "in_the_way");
+  // SQLite's name for what it has in memory.
+  fs::create_directory(folder_ / "copy.stillmap-shm");
+  std::ofstream(folder_ / "copy.stillmap-shm" / "in_the_way");
   EXPECT_THAT(why_refused([&] { saver.save_as("copy.stillmap"); }), HasSubstr("cannot be written"));
   EXPECT_FALSE(fs::exists(folder_ / "copy.stillmap"));
 }
@@ -317,6 +318,35 @@ TEST_F(MapSaverSafetyTest, SavedMapsHaveALimit) {
   EXPECT_THAT(why_refused([&] { saver.begin_anew(false, begin_); }), HasSubstr("map.saved_maps"));
   EXPECT_EQ(latest_map_.view()->tiles.size(), 1U) << "the running map goes on";
   EXPECT_TRUE(saver.begin_anew(true, begin_).kept_file.empty());
+}
+
+TEST_F(MapSaverSafetyTest, FilesOfOthersBesideAMapStay) {
+  const std::vector<std::string> names{"city.stillmap.new", "city.stillmap.empty",
+                                       "before.stillmap.new"};
+  for (const std::string& name : names) std::ofstream(folder_ / name) << "mine";
+  {
+    MapSaver saver = this->saver();
+    saver.set_source(source_);
+    map_scan(5.0F);
+    saver.save_as("before.stillmap");
+    saver.begin_anew(true, begin_);
+  }
+  for (const std::string& name : names) EXPECT_EQ(content_of(folder_ / name), "mine") << name;
+  EXPECT_EQ(tile_in(folder_ / "before.stillmap"), 0);
+  EXPECT_EQ(tile_in(file_), -1);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator()), 5)
+      << "these three and two maps";
+}
+
+TEST_F(MapSaverSafetyTest, SaysWhyANameIsNone) {
+  MapSaver saver = this->saver();
+  saver.set_source(source_);
+  map_scan(5.0F);
+  for (const auto& [name, why] : {std::pair(std::string("city.lock"), "ends in .lock"),
+                                  std::pair(std::string(300, 'x'), "has 300 bytes"),
+                                  std::pair(std::string("a:b"), "without any of")}) {
+    EXPECT_THAT(why_refused([&] { saver.save_as(name); }), HasSubstr(why)) << name;
+  }
 }
 
 }  // namespace

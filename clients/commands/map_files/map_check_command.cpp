@@ -5,6 +5,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "core/map/tools/map_check.hpp"
 
 namespace stillmap::cli {
@@ -63,6 +64,7 @@ std::string describe(const MapCheck& check) {
 }
 
 ExitCode run(const MapCheckArguments& arguments) {
+  end_cleanly_when_stopped();
   const MapCheck check = check_with_progress(arguments.file);
   std::cout << (arguments.json ? to_json(check).dump(2) + "\n" : describe(check));
   return check.is_sound() ? ExitCode::ok : ExitCode::failed;

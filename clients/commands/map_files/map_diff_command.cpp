@@ -6,6 +6,7 @@
 
 #include "clients/commands/command.hpp"
 #include "clients/terminal/json.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/map/tools/map_diff.hpp"
@@ -132,6 +133,7 @@ struct MapDiffArguments {
 };
 
 ExitCode run(const MapDiffArguments& arguments) {
+  end_cleanly_when_stopped();
   const MapSnapshot before = read_map_file(arguments.before).view;
   const MapSnapshot after = read_map_file(arguments.after).view;
   const MapDiff diff = diff_maps(before, after, arguments.options);

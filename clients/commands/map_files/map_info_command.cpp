@@ -9,6 +9,7 @@
 
 #include "clients/commands/command.hpp"
 #include "clients/terminal/json.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/map/tools/map_info.hpp"
 
@@ -153,6 +154,7 @@ struct MapInfoArguments {
 };
 
 ExitCode run(const MapInfoArguments& arguments) {
+  end_cleanly_when_stopped();
   const MapFileInfo info = map_file_info(arguments.file);
   std::cout << (arguments.json ? to_json(info).dump(2) + "\n" : describe(info));
   return ExitCode::ok;

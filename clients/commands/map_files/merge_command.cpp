@@ -11,9 +11,11 @@
 #include "clients/commands/mapping/earlier_map.hpp"
 #include "clients/commands/mapping/map_report.hpp"
 #include "clients/terminal/json.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/map/map_id.hpp"
 #include "core/map/query/tile_reader.hpp"
+#include "core/map/storage/fresh_map_file.hpp"
 #include "core/map/storage/map_lock.hpp"
 #include "core/map/storage/map_sessions.hpp"
 #include "core/session/map_merge.hpp"
@@ -45,9 +47,13 @@ void check_out(const MergeArguments& arguments) {
           arguments.out + " is one of the maps, which stay as they are: " + "name another --out");
     }
   }
-  if (std::filesystem::exists(arguments.out) && !arguments.force) {
+  if (!std::filesystem::exists(arguments.out)) return;
+  if (!arguments.force) {
     throw std::invalid_argument(arguments.out +
                                 " exists already: choose another --out, or --force to replace it");
+  }
+  if (!std::filesystem::is_regular_file(arguments.out)) {
+    throw std::invalid_argument(arguments.out + " is not a file: choose another --out");
   }
 }
 
@@ -74,23 +80,23 @@ std::string source_of(const std::string& file) {
 
 void save_merged(const MergeArguments& arguments, const EarlierMap& map, const SavedMap& merged,
                  std::int64_t clock_offset_ns, std::size_t closures) {
-  const MapLock lock(arguments.out);
-  const std::filesystem::path fresh = arguments.out + ".merged";
   try {
-    map.copy_to(fresh);
-    add_map_session(fresh, merged,
+    const FreshMapFile fresh(arguments.out);
+    map.copy_to(fresh.path());
+    add_map_session(fresh.path(), merged,
                     {.source = source_of(arguments.other),
                      .clock_offset_ns = clock_offset_ns,
                      .closures = closures});
-    replace_map_file(fresh, arguments.out);
-  } catch (...) {
-    std::error_code ignored;
-    std::filesystem::remove(fresh, ignored);
-    throw;
+    replace_map_file(fresh.path(), arguments.out);
+  } catch (const MapFileWriteError& error) {
+    throw MapFileWriteError(arguments.out, std::string("cannot be written (") + error.what() + ")");
   }
 }
 
 ExitCode run(const MergeArguments& arguments) {
+  end_cleanly_when_stopped();
+  // Until the result is written, nobody else puts a map there.
+  const MapLock lock(arguments.out);
   check_out(arguments);
   const auto began = std::chrono::steady_clock::now();
   const EarlierMap map(arguments.map, std::nullopt);

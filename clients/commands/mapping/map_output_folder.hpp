@@ -7,9 +7,9 @@
 
 namespace stillmap::cli {
 
-/// What to do about a map or a run that the output folder has already.
+/// What to do about results or a run that the output folder has already.
 struct OutputPolicy {
-  /// Replace it.
+  /// Replace them.
   bool force = false;
   /// Go on with the run that was not finished.
   bool resume = false;
@@ -19,9 +19,9 @@ struct OutputPolicy {
 /// and take the place of older ones only when they are complete: until then those stay.
 class MapOutputFolder {
  public:
-  /// Makes the folders. Throws std::invalid_argument when there is a map or an unfinished run and
-  /// the policy does not say what to do, DatasetError for a folder that cannot be made, and
-  /// MapFileError when another process writes the map.
+  /// Makes the folders. Throws std::invalid_argument when there is a file of a result's name or an
+  /// unfinished run and the policy does not say what to do, DatasetError for a folder that cannot
+  /// be made, and MapFileError when another process writes the map.
   MapOutputFolder(std::filesystem::path folder, const OutputPolicy& policy);
   /// Removes the unfinished folder when there is no run in it to go on with.
   ~MapOutputFolder();

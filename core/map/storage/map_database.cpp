@@ -14,6 +14,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "core/map/storage/fresh_map_file.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "core/map/storage/save_marks.hpp"
 #include "core/map/storage/tile_codec.hpp"
@@ -145,14 +146,14 @@ void set_number(SQLite::Database& database, const std::string& pragma, std::uint
 
 /// Made under another name and then renamed, so that an incomplete file never has this name.
 void create(const fs::path& file) {
-  const fs::path fresh = beside(file, ".new");
-  for (const fs::path& leftover :
-       {fresh, beside(fresh, "-journal"), beside(file, "-wal"), beside(file, "-shm")}) {
+  for (const char* suffix : {"-wal", "-shm"}) {
     std::error_code none_there;
-    fs::remove(leftover, none_there);
+    fs::remove(beside(file, suffix), none_there);
   }
+  const FreshMapFile fresh(file);
   {
-    SQLite::Database database(sqlite_name(fresh), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    SQLite::Database database(sqlite_name(fresh.path()),
+                              SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
     set_number(database, "page_size", page_bytes);
     SQLite::Transaction transaction(database);
     set_number(database, "application_id", application_id);
@@ -163,7 +164,7 @@ void create(const fs::path& file) {
     transaction.commit();
     database.exec("PRAGMA journal_mode = WAL");
   }
-  fs::rename(fresh, file);
+  fs::rename(fresh.path(), file);
   sync_folder(file);
 }
 

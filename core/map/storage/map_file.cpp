@@ -9,18 +9,19 @@
 
 #include <algorithm>
 #include <condition_variable>
-#include <cstdlib>
 #include <mutex>
 #include <optional>
 #include <system_error>
 #include <utility>
 #include <vector>
 
+#include "core/map/storage/fresh_map_file.hpp"
 #include "core/map/storage/map_database.hpp"
 #include "core/map/storage/map_tables.hpp"
 #include "core/map/storage/save_marks.hpp"
 #include "core/map/storage/session_tables.hpp"
 #include "core/map/storage/tile_codec.hpp"
+#include "core/process/temporary_folder.hpp"
 
 namespace stillmap {
 namespace {
@@ -32,35 +33,21 @@ MapFileError unreadable(const fs::path& file, const std::runtime_error& error) {
                     "); restore a copy or name another file"};
 }
 
-/// A temporary folder, removed with its last user.
-class ScratchMapFolder {
- public:
-  ScratchMapFolder() {
-    std::string pattern = (fs::temp_directory_path() / "stillmap-XXXXXX").string();
-    if (::mkdtemp(pattern.data()) == nullptr) {
-      throw MapFileError(pattern, "cannot be made; set TMPDIR to a folder that can be written");
-    }
-    path_ = pattern;
+std::shared_ptr<const TemporaryFolder> scratch_folder() {
+  const fs::path prefix = fs::temp_directory_path() / "stillmap-";
+  try {
+    return std::make_shared<const TemporaryFolder>(prefix);
+  } catch (const fs::filesystem_error& error) {
+    throw MapFileError(error.path1(), "cannot be made; set TMPDIR to a folder that can be written");
   }
-  ~ScratchMapFolder() {
-    std::error_code nothing_to_do;
-    fs::remove_all(path_, nothing_to_do);
-  }
-  ScratchMapFolder(const ScratchMapFolder&) = delete;
-  ScratchMapFolder& operator=(const ScratchMapFolder&) = delete;
-
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
+}
 
 /// Reads through connections of its own, so that readers wait neither for a save nor for each
 /// other. All are opened at once: the file may lie under another name later, and another map under
 /// this.
 class SqliteTileStore : public TileStore {
  public:
-  SqliteTileStore(const fs::path& file, std::shared_ptr<const ScratchMapFolder> folder)
+  SqliteTileStore(const fs::path& file, std::shared_ptr<const TemporaryFolder> folder)
       : folder_(std::move(folder)), file_(file) {
     connections_.reserve(max_readers);
     while (connections_.size() < max_readers) {
@@ -106,7 +93,7 @@ class SqliteTileStore : public TileStore {
     SQLite::Database* database = nullptr;
   };
 
-  std::shared_ptr<const ScratchMapFolder> folder_;
+  std::shared_ptr<const TemporaryFolder> folder_;
   fs::path file_;
   std::mutex mutex_;
   std::condition_variable given_back_;
@@ -117,7 +104,7 @@ class SqliteTileStore : public TileStore {
 class SqliteMapStore : public MapStore {
  public:
   explicit SqliteMapStore(const fs::path& file,
-                          std::shared_ptr<const ScratchMapFolder> folder = nullptr)
+                          std::shared_ptr<const TemporaryFolder> folder = nullptr)
       : folder_(std::move(folder)), file_(file), database_(open_map_database(file)) {}
 
   std::uint64_t save(const SavedMap& map) override {
@@ -209,14 +196,11 @@ class SqliteMapStore : public MapStore {
   void copy_to(const fs::path& file) override {
     // What is there must be a map, or nothing: another program's file is not overwritten.
     if (fs::exists(file)) static_cast<void>(open_map_database(file));
-    const fs::path fresh = beside(file, ".new");
     try {
-      fs::remove(fresh);
-      back_up_to(fresh);
-      put_in_place(fresh, file);
+      const FreshMapFile fresh(file);
+      back_up_to(fresh.path());
+      put_in_place(fresh.path(), file);
     } catch (const std::runtime_error& error) {
-      std::error_code ignored;
-      fs::remove(fresh, ignored);
       throw MapFileWriteError(file, std::string("cannot be written (") + error.what() + ")");
     }
   }
@@ -345,7 +329,7 @@ class SqliteMapStore : public MapStore {
     saved_tiles_ = stored.view.tiles;
   }
 
-  std::shared_ptr<const ScratchMapFolder> folder_;
+  std::shared_ptr<const TemporaryFolder> folder_;
   fs::path file_;
   SQLite::Database database_;
   /// What is stored, once it was read: a save looks at what differs from it.
@@ -395,7 +379,7 @@ std::shared_ptr<TileStore> open_tile_store(const fs::path& file) {
 }
 
 std::unique_ptr<MapStore> open_scratch_map() {
-  auto folder = std::make_shared<const ScratchMapFolder>();
+  auto folder = scratch_folder();
   const fs::path file = folder->path() / "map.stillmap";
   return std::make_unique<SqliteMapStore>(file, std::move(folder));
 }

@@ -3,7 +3,6 @@
 #include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Exception.h>
 
-#include <cstdlib>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -19,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void check_readable(const fs::path& file) {
+fs::path readable(fs::path file) {
   std::error_code error;
   if (!fs::exists(file, error)) throw MapFileError(file, "is not there; name a map file");
   if (!fs::is_regular_file(file, error)) throw MapFileError(file, "is not a file; name a map file");
@@ -27,17 +26,16 @@ void check_readable(const fs::path& file) {
   if (!std::ifstream(file, std::ios::binary)) {
     throw MapFileError(file, "cannot be read; check its permissions");
   }
+  return file;
 }
 
-fs::path fresh_folder(const fs::path& file) {
-  std::error_code error;
-  const fs::path parent = fs::temp_directory_path(error);
-  std::string name = (parent / "stillmap-read-XXXXXX").string();
-  if (error || mkdtemp(name.data()) == nullptr) {
-    throw MapFileError(file, "cannot be copied to the temporary folder '" + parent.string() +
-                                 "' to be read there; set TMPDIR to a folder that can be written");
+TemporaryFolder folder_for_copy_of(const fs::path& file) {
+  try {
+    return TemporaryFolder(fs::temp_directory_path() / "stillmap-read-");
+  } catch (const fs::filesystem_error& error) {
+    throw MapFileError(file, std::string("cannot be copied to a temporary folder to be read (") +
+                                 error.what() + "); set TMPDIR to a folder that can be written");
   }
-  return name;
 }
 
 /// A read transaction on a file that a server may have open: while it lasts, the log is not
@@ -86,23 +84,16 @@ MapFileError error_of(const fs::path& file, const fs::path& copy, const MapFileE
   return {file, text.starts_with(name) ? text.substr(name.size()) : text};
 }
 
-MapFileCopy::MapFileCopy(fs::path file) : file_(std::move(file)) {
-  check_readable(file_);
-  folder_ = fresh_folder(file_);
-  copy_ = folder_ / "map.stillmap";
+MapFileCopy::MapFileCopy(fs::path file)
+    : file_(readable(std::move(file))),
+      folder_(folder_for_copy_of(file_)),
+      copy_(folder_.path() / "map.stillmap") {
   try {
     copy_with_log(real_file(file_), copy_);
   } catch (const fs::filesystem_error& error) {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
     throw MapFileError(file_, std::string("cannot be copied to be read (") + error.what() +
                                   "); make room there, or set TMPDIR to a folder with room");
   }
-}
-
-MapFileCopy::~MapFileCopy() {
-  std::error_code ignored;
-  fs::remove_all(folder_, ignored);
 }
 
 void MapFileCopy::check_format() const {

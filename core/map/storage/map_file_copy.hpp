@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "core/map/storage/map_file.hpp"
+#include "core/process/temporary_folder.hpp"
 
 namespace stillmap {
 
@@ -13,9 +14,6 @@ class MapFileCopy {
  public:
   /// Throws MapFileError: missing, empty, not a file, not readable, or no room for the copy.
   explicit MapFileCopy(std::filesystem::path file);
-  ~MapFileCopy();
-  MapFileCopy(const MapFileCopy&) = delete;
-  MapFileCopy& operator=(const MapFileCopy&) = delete;
 
   [[nodiscard]] const std::filesystem::path& path() const { return copy_; }
 
@@ -27,7 +25,7 @@ class MapFileCopy {
 
  private:
   std::filesystem::path file_;
-  std::filesystem::path folder_;
+  TemporaryFolder folder_;
   std::filesystem::path copy_;
 };
 

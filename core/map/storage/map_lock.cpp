@@ -12,6 +12,7 @@
 #include <sstream>
 #include <string>
 
+#include "core/map/storage/fresh_map_file.hpp"
 #include "core/map/storage/map_database.hpp"
 #include "core/map/storage/map_file.hpp"
 
@@ -26,6 +27,9 @@ std::string host_name() {
   return name.data();
 }
 
+/// Of a host name and a process at most; a larger file of that name is no lock.
+constexpr off_t max_lock_bytes = 511;
+
 struct Holder {
   std::string host;
   pid_t pid = 0;
@@ -33,7 +37,7 @@ struct Holder {
 
 /// As written in the lock file; without pid where nothing is.
 Holder holder_in(int descriptor) {
-  std::array<char, 512> text{};
+  std::array<char, max_lock_bytes + 1> text{};
   const ssize_t bytes = ::pread(descriptor, text.data(), text.size() - 1, 0);
   Holder holder;
   if (bytes > 0) std::istringstream(text.data()) >> holder.host >> holder.pid;
@@ -60,6 +64,11 @@ MapFileError not_lockable(const fs::path& map_file, const char* why) {
           std::string("cannot be locked (") + why + "); its folder must exist and be writable"};
 }
 
+MapFileError not_a_lock(const fs::path& map_file, const fs::path& lock_file) {
+  return {map_file, "cannot be locked: " + lock_file.string() +
+                        " is something else than a lock; move that, or name another file"};
+}
+
 /// Opens and locks it; -1 when it was removed meanwhile, by a holder that ended.
 int try_lock(const fs::path& lock_file, const fs::path& map_file) {
   const int descriptor = ::open(lock_file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
@@ -73,11 +82,11 @@ int try_lock(const fs::path& lock_file, const fs::path& map_file) {
   }
   struct stat opened {};
   struct stat named {};
-  if (::fstat(descriptor, &opened) == 0 && ::stat(lock_file.c_str(), &named) == 0 &&
-      opened.st_ino == named.st_ino) {
-    return descriptor;
-  }
+  const bool is_named = ::fstat(descriptor, &opened) == 0 &&
+                        ::stat(lock_file.c_str(), &named) == 0 && opened.st_ino == named.st_ino;
+  if (is_named && opened.st_size <= max_lock_bytes) return descriptor;
   ::close(descriptor);
+  if (is_named) throw not_a_lock(map_file, lock_file);
   return -1;
 }
 
@@ -90,8 +99,13 @@ MapLock::MapLock(const fs::path& map_file) : lock_file_(beside(real_file(map_fil
   const bool is_named =
       ::ftruncate(descriptor_, 0) == 0 &&
       ::pwrite(descriptor_, holder.data(), holder.size(), 0) == static_cast<ssize_t>(holder.size());
-  if (is_named) return;
+  if (is_named) {
+    remove_left_fresh_files(map_file);
+    return;
+  }
   const std::string why = std::strerror(errno);
+  std::error_code ignored;
+  fs::remove(lock_file_, ignored);
   ::close(descriptor_);
   throw not_lockable(map_file, why.c_str());
 }

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <filesystem>
+
+#include "core/process/temporary_folder.hpp"
+
+namespace stillmap {
+
+/// A map file that is made beside the one whose place it is to take. It lies in a folder of its
+/// own, "NAME.new-" and six letters more, so that neither it nor what SQLite puts beside it is ever
+/// a file of somebody else. Where it did not take the place, it goes with the object.
+class FreshMapFile {
+ public:
+  /// Throws std::filesystem::filesystem_error.
+  explicit FreshMapFile(const std::filesystem::path& file);
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  TemporaryFolder folder_;
+  std::filesystem::path path_;
+};
+
+/// Removes what killed processes left of such folders. For who holds the lock of the file (MapLock)
+/// and has made none yet.
+void remove_left_fresh_files(const std::filesystem::path& file);
+
+}  // namespace stillmap
