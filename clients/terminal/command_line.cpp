@@ -3,8 +3,35 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <CLI/TypeTools.hpp>
+#include <cmath>
+#include <limits>
+#include <sstream>
 
 namespace stillmap::cli {
+namespace {
+
+/// CLI11's own range takes NaN for a number in it, and names its limits with 309 digits.
+std::string fault_of_positive(const std::string& word, double most) {
+  double value = 0.0;
+  if (CLI::detail::lexical_cast(word, value) && std::isfinite(value) && value > 0.0 &&
+      value <= most) {
+    return {};
+  }
+  std::ostringstream fault;
+  fault << "'" << word << "' must be a finite number above zero";
+  if (std::isfinite(most)) fault << ", and " << static_cast<int>(most) << " at most";
+  return fault.str();
+}
+
+/// CLI11 reads -1 as the greatest number that there is.
+std::string fault_of_unsigned(const std::string& word) {
+  const std::size_t first = word.find_first_not_of(" \t\n\v\f\r");
+  if (first == std::string::npos || word[first] != '-') return {};
+  return "'" + word + "' is negative; it must be a whole number of 0 or more";
+}
+
+}  // namespace
 
 OptionHandle OptionHandle::required() {
   option_->required();
@@ -22,7 +49,15 @@ OptionHandle OptionHandle::one_of(const std::vector<std::string>& values) {
 }
 
 OptionHandle OptionHandle::above_zero() {
-  option_->check(CLI::PositiveNumber);
+  constexpr double no_limit = std::numeric_limits<double>::infinity();
+  option_->check([](const std::string& word) { return fault_of_positive(word, no_limit); },
+                 "POSITIVE");
+  return *this;
+}
+
+OptionHandle OptionHandle::above_zero_to(int most) {
+  option_->check([most](const std::string& word) { return fault_of_positive(word, most); },
+                 "above 0 to " + std::to_string(most));
   return *this;
 }
 
@@ -56,6 +91,11 @@ OptionHandle OptionHandle::excludes(const OptionHandle& other) {
   return *this;
 }
 
+OptionHandle OptionHandle::needs(const OptionHandle& other) {
+  option_->needs(other.option_);
+  return *this;
+}
+
 OptionHandle CommandHandle::option(const std::string& names, std::string& value,
                                    const std::string& help) {
   return OptionHandle(*app_->add_option(names, value, help));
@@ -72,12 +112,12 @@ OptionHandle CommandHandle::option(const std::string& names, int& value, const s
 
 OptionHandle CommandHandle::option(const std::string& names, std::uint32_t& value,
                                    const std::string& help) {
-  return OptionHandle(*app_->add_option(names, value, help));
+  return OptionHandle(*app_->add_option(names, value, help)->check(fault_of_unsigned));
 }
 
 OptionHandle CommandHandle::option(const std::string& names, std::uint64_t& value,
                                    const std::string& help) {
-  return OptionHandle(*app_->add_option(names, value, help));
+  return OptionHandle(*app_->add_option(names, value, help)->check(fault_of_unsigned));
 }
 
 OptionHandle CommandHandle::option(const std::string& names, std::vector<std::string>& values,
@@ -90,8 +130,8 @@ OptionHandle CommandHandle::option(const std::string& names, std::vector<double>
   return OptionHandle(*app_->add_option(names, values, help));
 }
 
-void CommandHandle::flag(const std::string& names, bool& value, const std::string& help) {
-  app_->add_flag(names, value, help);
+OptionHandle CommandHandle::flag(const std::string& names, bool& value, const std::string& help) {
+  return OptionHandle(*app_->add_flag(names, value, help));
 }
 
 void CommandHandle::renamed(const std::string& former_name, const std::string& name) {

@@ -25,6 +25,8 @@ class OptionHandle {
   OptionHandle with_default();
   OptionHandle one_of(const std::vector<std::string>& values);
   OptionHandle above_zero();
+  /// Above zero, and so much at most, which the help shows.
+  OptionHandle above_zero_to(int most);
   OptionHandle between(int low, int high);
   /// A list of exactly so many values.
   OptionHandle exactly(int values);
@@ -36,6 +38,8 @@ class OptionHandle {
   OptionHandle from_environment(const std::string& variable);
   /// Both cannot be given.
   OptionHandle excludes(const OptionHandle& other);
+  /// It says nothing without the other, and cannot be given alone.
+  OptionHandle needs(const OptionHandle& other);
 
  private:
   CLI::Option* option_;
@@ -50,6 +54,7 @@ class CommandHandle {
   OptionHandle option(const std::string& names, std::string& value, const std::string& help);
   OptionHandle option(const std::string& names, double& value, const std::string& help);
   OptionHandle option(const std::string& names, int& value, const std::string& help);
+  /// A negative number is wrong usage.
   OptionHandle option(const std::string& names, std::uint32_t& value, const std::string& help);
   OptionHandle option(const std::string& names, std::uint64_t& value, const std::string& help);
   OptionHandle option(const std::string& names, std::vector<std::string>& values,
@@ -57,7 +62,7 @@ class CommandHandle {
   OptionHandle option(const std::string& names, std::vector<double>& values,
                       const std::string& help);
   /// "--labels,!--no-labels" has a name for each state.
-  void flag(const std::string& names, bool& value, const std::string& help);
+  OptionHandle flag(const std::string& names, bool& value, const std::string& help);
   /// Makes an option's former name, with a value, wrong usage that names the new one.
   void renamed(const std::string& former_name, const std::string& name);
 

@@ -1,6 +1,7 @@
 #include "clients/terminal/table.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iomanip>
 #include <sstream>
 #include <utility>
@@ -8,8 +9,11 @@
 namespace stillmap::cli {
 
 std::string fixed(double value, int decimals) {
+  // No decimals are known of larger numbers, and 1e300 has 301 digits.
+  constexpr double largest_with_decimals = 1e15;
   std::ostringstream text;
-  text << std::fixed << std::setprecision(decimals) << value;
+  if (std::abs(value) < largest_with_decimals) text << std::fixed << std::setprecision(decimals);
+  text << value;
   return text.str();
 }
 

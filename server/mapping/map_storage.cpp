@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <map>
+#include <stdexcept>
 
 namespace stillmap::server {
 namespace {
@@ -27,8 +28,13 @@ std::optional<SavedMap> saved_map(MapSaver& saver, const ServerConfig& config) {
     }
     return std::nullopt;
   }
-  auto stored =
-      saver.load([&](const MapSnapshot& map) { check_sizes(map, config.mapper.static_map); });
+  auto stored = saver.load([&](const MapSnapshot& map) {
+    try {
+      check_sizes(map, config.mapper.static_map);
+    } catch (const std::invalid_argument& fault) {
+      throw MapFileError(config.map.file, fault.what());
+    }
+  });
   if (stored && !stored->view.tiles.empty()) {
     spdlog::info("resuming from {}: {} tiles, {} poses", config.map.file.string(),
                  stored->view.tiles.size(), stored->trajectory.size());

@@ -16,8 +16,8 @@ namespace stillmap::server {
 class MapStorage {
  public:
   /// Opens the map file, and loads it where the configuration says so; otherwise a map that is in
-  /// it is kept under another name. `label_source` goes into the file. Throws MapFileError, or
-  /// std::invalid_argument for a map that does not fit the configuration.
+  /// it is kept under another name. `label_source` goes into the file. Throws MapFileError, also
+  /// for a map that does not fit the configuration.
   MapStorage(const ServerConfig& config, const std::string& label_source, Statistics& statistics);
 
   /// What was loaded, for mapping to resume; nothing where nothing was, and from the second call

@@ -268,5 +268,27 @@ TEST_F(EvaluateCommandTest, NamesWhatADriveCannotBe) {
   }
 }
 
+TEST_F(EvaluateCommandTest, RefusesDistancesAndTimesThatAreNone) {
+  write("truth.txt", straight_path(20, 1.0));
+  write("estimate.txt", straight_path(20, 1.0));
+  for (const char* option :
+       {"--max-difference nan", "--max-difference -1", "--max-difference 1e10"})
+    EXPECT_EQ(compare(option).exit_code, 2) << option;
+  for (const char* option : {"--max-range nan", "--max-range -5"}) {
+    const ProcessResult refused = run(std::string("evaluate map --truth x --map y ") + option);
+    EXPECT_EQ(refused.exit_code, 2) << option;
+    EXPECT_THAT(refused.err, HasSubstr("--max-range")) << option;
+  }
+}
+
+TEST_F(EvaluateCommandTest, PicturesNeedAFolder) {
+  write("truth.txt", straight_path(20, 1.0));
+  write("estimate.txt", straight_path(20, 1.0));
+  const ProcessResult refused = compare("--pictures " + path("truth.txt"));
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err,
+              AllOf(HasSubstr("--pictures " + path("truth.txt")), HasSubstr("name a folder")));
+}
+
 }  // namespace
 }  // namespace stillmap::test

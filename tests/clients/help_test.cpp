@@ -65,5 +65,52 @@ TEST_F(HelpTest, WrongUsageIsExitCodeTwoAndSaysWhatIsWrong) {
   EXPECT_THAT(result.err, HasSubstr("--speed"));
 }
 
+TEST_F(HelpTest, NumbersBelowZeroAreRefusedWhereThereAreNone) {
+  for (const auto& [command, option] :
+       {std::pair("query --since-version -1", "--since-version"),
+        std::pair("map x --scans -1", "--scans"), std::pair("map x --start ' -1'", "--start"),
+        std::pair("plan --to 1,1 --max-iterations -1", "--max-iterations"),
+        std::pair("octomap --max-voxels -1", "--max-voxels"),
+        std::pair("watch --count -1", "--count")}) {
+    const ProcessResult result = run(command);
+    EXPECT_EQ(result.exit_code, 2) << command;
+    EXPECT_THAT(result.err, AllOf(HasSubstr(option), HasSubstr("-1' is negative"))) << command;
+  }
+}
+
+TEST_F(HelpTest, TimesHaveLimitsThatTheHelpShows) {
+  EXPECT_THAT(run("status --help").out, HasSubstr("above 0 to 86400"));
+  for (const char* command :
+       {"status --timeout 1e17", "status --timeout nan", "status --timeout inf",
+        "map x --save-period 1e10", "doctor --listen 1e17",
+        "dataset export x y --idle-timeout 1e17", "plan --to 1,1 --time-limit inf"}) {
+    const ProcessResult result = run(command);
+    EXPECT_EQ(result.exit_code, 2) << command;
+    EXPECT_THAT(result.err, HasSubstr("must be a finite number above zero")) << command;
+    EXPECT_LT(result.err.size(), 200U) << result.err;
+  }
+}
+
+TEST_F(HelpTest, WhatSaysNothingAloneNamesWhatItNeeds) {
+  for (const auto& [command, needed] :
+       {std::pair("sessions x --out y", "--withdraw"),
+        std::pair("sessions x --force", "--withdraw"), std::pair("query --width 3", "--corridor"),
+        std::pair("traversable --width 3", "--corridor"),
+        std::pair("map-export x -o y.ply --width 3", "--corridor"),
+        std::pair("map-export x -o y.ply --outlier-neighbours 4", "--remove-outliers"),
+        std::pair("query --since-map 3", "--since-version"),
+        std::pair("plan --to 1,1 --count 3", "--follow"),
+        std::pair("plan --to 1,1 --duration 3", "--follow"),
+        std::pair("octomap --resolution 0.5", "--map")}) {
+    const ProcessResult result = run(command);
+    EXPECT_EQ(result.exit_code, 2) << command;
+    EXPECT_THAT(result.err, HasSubstr(std::string("requires ") + needed)) << command;
+  }
+}
+
+TEST_F(HelpTest, LoadSaysWhenTheRunningMapIsNotSaved) {
+  EXPECT_THAT(run("load --help").out, HasSubstr("what was saved there last"));
+}
+
 }  // namespace
 }  // namespace stillmap::test

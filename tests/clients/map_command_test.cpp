@@ -410,5 +410,65 @@ TEST_F(MapCommandTest, RefusesFileLabelsWhereThereAreNone) {
   EXPECT_EQ(map_city().exit_code, 0);
 }
 
+TEST_F(MapCommandTest, FilesThatHaveTheNameOfAResultAreReplacedOnlyWhenForced) {
+  simulate("city", 3);
+  std::filesystem::create_directory(folder_ / "out");
+  const std::vector<std::string> names{"report.json", "map.ply", "poses_base.txt",
+                                       "loops_after.png"};
+  for (const std::string& name : names) {
+    write("out/" + name, "mine");
+    const ProcessResult refused = map_city();
+    EXPECT_EQ(refused.exit_code, 2) << name;
+    EXPECT_THAT(refused.err, AllOf(HasSubstr(path("out/" + name)), HasSubstr("--force"))) << name;
+    EXPECT_EQ(content("out/" + name), "mine");
+    std::filesystem::remove(folder_ / "out" / name);
+  }
+  for (const std::string& name : names) write("out/" + name, "mine");
+  ASSERT_EQ(map_city("--force").exit_code, 0);
+  EXPECT_TRUE(nlohmann::json::accept(content("out/report.json")));
+  // There was no map that they could have been of.
+  for (const char* name : {"poses_base.txt", "loops_after.png"})
+    EXPECT_EQ(content(std::string("out/") + name), "mine") << name;
+}
+
+TEST_F(MapCommandTest, AFileInThePlaceOfTheUnfinishedRunIsLeftAlone) {
+  simulate("city", 2);
+  std::filesystem::create_directory(folder_ / "out");
+  write("out/unfinished", "chapter 1");
+  for (const char* const how : {"", "--force"}) {
+    const ProcessResult refused = map_city(how);
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_THAT(refused.err, HasSubstr(path("out/unfinished")));
+    EXPECT_EQ(content("out/unfinished"), "chapter 1");
+  }
+}
+
+TEST_F(MapCommandTest, ARunIsResumedAsItBegan) {
+  simulate("city", 14);
+  truncate("city/labels/000012.label", 10);
+  ASSERT_EQ(map_city("--strict --save-period 0.0001").exit_code, 2);
+  ASSERT_TRUE(exists("out/unfinished/run.stillmap"));
+  const ProcessResult fewer = map_city("--resume --scans 5");
+  EXPECT_EQ(fewer.exit_code, 2);
+  EXPECT_THAT(fewer.err, AllOf(HasSubstr("seen 12 scans"), HasSubstr("the 5 that"),
+                               HasSubstr("--scans"), HasSubstr("--force")));
+  write("server.yaml", "log: {level: info}\n");
+  const ProcessResult other = map_city("--resume --config " + path("server.yaml"));
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.err, HasSubstr("configuration of digest"));
+  ASSERT_TRUE(exists("out/unfinished/run.stillmap"));
+  const ProcessResult all = map_city("--resume --scans 12");
+  EXPECT_EQ(all.exit_code, 0) << all.err;
+  EXPECT_EQ(line_count("out/poses_lidar.txt"), 12U);
+}
+
+TEST_F(MapCommandTest, ADeniedLoopIsOfScansThatThereAre) {
+  simulate("city", 3);
+  const ProcessResult refused = map_city("--deny-loop 1:5000");
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("--deny-loop 1:5000"), HasSubstr("0 to 2")));
+  EXPECT_FALSE(exists("out"));
+}
+
 }  // namespace
 }  // namespace stillmap::test

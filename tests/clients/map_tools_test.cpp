@@ -184,5 +184,26 @@ TEST_F(MapToolsTest, LoadNeedsAServer) {
   EXPECT_EQ(result.exit_code, 3);
 }
 
+TEST_F(MapToolsTest, ALimitOfFileSizesIsAFullDisk) {
+  save_street("street.stillmap", true);
+  BackgroundProcess limited("env TMPDIR=" + folder_.string() + " sh -c 'ulimit -f 1; exec " +
+                                stillmap_program() + " map-info " + path("street.stillmap") + "'",
+                            folder_ / "log");
+  EXPECT_EQ(limited.wait(), 2);
+  EXPECT_THAT(content("log"), AllOf(HasSubstr("cannot be copied"), HasSubstr("make room")));
+}
+
+TEST_F(MapToolsTest, ADatumIsOfAGeoTiff) {
+  save_street("street.stillmap", true);
+  const std::string command = "map-export " + path("street.stillmap") + " --output ";
+  const ProcessResult cloud = run(command + path("x.ply") + " --datum 49,8");
+  EXPECT_EQ(cloud.exit_code, 2);
+  EXPECT_THAT(cloud.err, AllOf(HasSubstr("--datum 49,8"), HasSubstr("x.ply"), HasSubstr(".tif")));
+  EXPECT_FALSE(exists("x.ply"));
+  const ProcessResult nowhere = run(command + path("x.ply") + " --datum here");
+  EXPECT_EQ(nowhere.exit_code, 2);
+  EXPECT_THAT(nowhere.err, HasSubstr("here"));
+}
+
 }  // namespace
 }  // namespace stillmap::test

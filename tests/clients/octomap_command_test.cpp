@@ -56,10 +56,31 @@ TEST_F(OctomapCommandTest, RefusesWhatItCannotUse) {
   EXPECT_THAT(refusal(map + " --output map.ply"), HasSubstr("must end in .bt"));
   EXPECT_THAT(refusal(map + " --output " + path("no/map.bt")), HasSubstr("cannot be written"));
   EXPECT_THAT(refusal(map + " --point 1,2"), HasSubstr("--point has 2 numbers"));
-  EXPECT_THAT(refusal(map + " --resolution 0"), HasSubstr("occupancy.resolution_m"));
+  EXPECT_THAT(refusal(map + " --resolution 0"), HasSubstr("--resolution"));
   write("broken.bt", "# Octomap OcTree binary file\nid OcTree\nsize 9\nres 0.2\ndata\nxx");
   EXPECT_THAT(refusal("--map " + path("broken.bt")),
               AllOf(HasSubstr("broken.bt"), HasSubstr("damaged")));
+}
+
+TEST_F(OctomapCommandTest, WhatCannotBeAskedIsExitCodeTwo) {
+  for (const char* question : {"--point nan,0,0", "--box 1,1,1,-1,-1,-1", "--ray 0,0,0,0,0,0",
+                               "--box -1e6,-1e6,-1e6,1e6,1e6,1e6", "--point 1e300,0,0"}) {
+    const ProcessResult refused = octomap(std::string(question) + " --point 1,1,1");
+    EXPECT_EQ(refused.exit_code, 2) << question;
+    EXPECT_THAT(refused.out, AllOf(HasSubstr("cannot be asked"), HasSubstr("1.00, 1.00, 1.00: ")));
+    EXPECT_LT(refused.out.size(), 400U) << refused.out;
+  }
+  const ProcessResult json = octomap("--point nan,0,0 --json");
+  EXPECT_EQ(json.exit_code, 2);
+  const nlohmann::json answers = nlohmann::json::parse(json.out).at("answers");
+  EXPECT_THAT(answers.at("points").at(0).at("fault"), HasSubstr("nan"));
+}
+
+TEST_F(OctomapCommandTest, AnOctomapFileHasAResolutionOfItsOwn) {
+  ASSERT_EQ(octomap("--resolution 0.4 --output " + path("map.bt")).exit_code, 0);
+  const ProcessResult refused = run("octomap --resolution 0.2 --map " + path("map.bt"));
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("--resolution"), HasSubstr("map.bt")));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "idl/bag/bag.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 #include "tests/clients/command_test.hpp"
+#include "tests/idl/bag_fixture.hpp"
 
 namespace stillmap::test {
 namespace {
@@ -178,6 +179,31 @@ TEST_F(RecordTest, PacketsOfARealBagAreMapped) {
   const ProcessResult result = run("map " + bag + " --labels none --json --out " + path("out"));
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(line_count("out/poses_lidar.txt"), 4U);
+}
+
+/// A bag with the scans on /a, and again on /b; the last message of each is damaged.
+void write_two_lidars(const std::filesystem::path& folder, const ScanDataset& scans) {
+  dds::BagWriter writer(folder, {dds::cloud_topic("/a"), dds::cloud_topic("/b")});
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    dds::Bytes message = dds::serialized(wire::to_cloud(scans.read(i).scan, {}, "lidar"));
+    if (i + 1 == scans.size()) message.resize(8);
+    for (const std::size_t topic : {0U, 1U}) writer.add(topic, scans.stamp_ns(i), message);
+  }
+  writer.finish();
+}
+
+TEST_F(RecordTest, ARunOverOneTopicIsNotResumedOverAnother) {
+  simulate("city", 13);
+  write_two_lidars(folder_ / "bag", ScanDataset(path("city")));
+  const std::string map = "map " + path("bag") + " --labels none --out " + path("out");
+  EXPECT_EQ(run(map + " --topic-in /a --strict --save-period 0.0001").exit_code, 2);
+  ASSERT_TRUE(exists("out/unfinished/run.stillmap"));
+  const ProcessResult other = run(map + " --topic-in /b --resume");
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.err, AllOf(HasSubstr("/a from scan 0"), HasSubstr("/b from scan 0")));
+  const ProcessResult same = run(map + " --topic-in a --resume");
+  EXPECT_EQ(same.exit_code, 0) << same.err;
+  EXPECT_EQ(line_count("out/poses_lidar.txt"), 12U);
 }
 
 }  // namespace

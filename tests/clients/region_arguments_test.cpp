@@ -1,6 +1,7 @@
 #include "clients/commands/query/region_arguments.hpp"
 
 #include <fstream>
+#include <limits>
 
 #include "tests/clients/command_test.hpp"
 
@@ -54,6 +55,20 @@ TEST_F(RegionArgumentsTest, ChecksRegionsBeforeAnybodyIsAsked) {
   region.min_z_m = 5.0;
   region.max_z_m = 1.0;
   EXPECT_THROW(cli::check_region(region), std::invalid_argument);
+}
+
+TEST_F(RegionArgumentsTest, NamesAFolderAndASquareWithoutASize) {
+  expect_refused({folder_.string()}, folder_.string() + ": is a folder");
+  for (const double size_m : {-5.0, 0.0, std::numeric_limits<double>::quiet_NaN()}) {
+    cli::RegionArguments region;
+    region.around = {0.0, 0.0, size_m};
+    try {
+      cli::check_region(region);
+      FAIL() << size_m;
+    } catch (const std::invalid_argument& error) {
+      EXPECT_THAT(error.what(), AllOf(HasSubstr("--around"), HasSubstr("above 0 m")));
+    }
+  }
 }
 
 }  // namespace

@@ -225,5 +225,31 @@ TEST_F(ServiceCommandTest, AsksARunningServerWhereARobotCanGo) {
   EXPECT_THAT(nobody.err, AllOf(HasSubstr("submarine"), HasSubstr("car, delivery_robot")));
 }
 
+TEST_F(ServiceCommandTest, RestoresNothingWithoutABox) {
+  const std::string removed = "removed" + on_domain() + " --timeout 0.5 --restore ";
+  for (const auto& [rest, named] :
+       {std::pair("moving", "--around-robot"), std::pair("moving --min-z 0", "--around-robot"),
+        std::pair("moving --sphere 0 0 0 5", "--around-robot"),
+        std::pair("still --box 0 0 0 1 1 1", "no reason"),
+        std::pair("moving --box 0 0 0 1 1 1 --picture x.png", "--picture x.png")}) {
+    const ProcessResult refused = run(removed + rest);
+    EXPECT_EQ(refused.exit_code, 2) << rest;
+    EXPECT_THAT(refused.err, HasSubstr(named)) << rest;
+  }
+  EXPECT_EQ(run(removed + "moving --around 0 0 5").exit_code, 3) << "nobody is asked before";
+}
+
+TEST_F(ServiceCommandTest, WatchTriesItsFileFirst) {
+  const std::string watch = "watch" + on_domain() + " --timeout 0.5 --out ";
+  const ProcessResult refused = run(watch + path("no/poses.tum"));
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr(path("no/poses.tum")));
+  write("old.tum", "mine");
+  EXPECT_EQ(run(watch + path("old.tum")).exit_code, 3);
+  EXPECT_EQ(content("old.tum"), "mine");
+  EXPECT_EQ(run(watch + path("new.tum")).exit_code, 3);
+  EXPECT_FALSE(exists("new.tum"));
+}
+
 }  // namespace
 }  // namespace stillmap::test

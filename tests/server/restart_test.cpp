@@ -220,7 +220,16 @@ TEST(Startup, RefusesWhatCannotWorkWithAnExitCode) {
 
   std::ofstream(folder / "text.stillmap") << "this is no database, and must stay as it is";
   ServerProcess wrong_file({"--map-file", (folder / "text.stillmap").string(), "--domain", "231"});
-  EXPECT_EQ(wrong_file.wait_for_exit(patience), 1);
+  EXPECT_EQ(wrong_file.wait_for_exit(patience), 2);
+
+  std::filesystem::create_directory(folder / "folder.stillmap");
+  ServerProcess a_folder({"--map-file", (folder / "folder.stillmap").string(), "--domain", "231"});
+  EXPECT_EQ(a_folder.wait_for_exit(patience), 2);
+
+  // It may be mounted later.
+  ServerProcess no_folder(
+      {"--map-file", (folder / "no/city.stillmap").string(), "--domain", "231"});
+  EXPECT_EQ(no_folder.wait_for_exit(patience), 1);
 
   ServerProcess help({"--help"});
   EXPECT_EQ(help.wait_for_exit(patience), 0);
@@ -241,11 +250,12 @@ class Onlooker : public dds::VendorParticipant::Listener {
   const dds::VendorParticipant participant_{dds::eclipse_cyclone, this};
 };
 
-/// What a server says that ends by itself, with exit code 1.
+/// What a server says that ends by itself, with the exit code after which systemd does not start it
+/// again.
 std::string last_words(const ServiceSetup& setup) {
   testing::internal::CaptureStderr();
   ServerProcess server(setup.server_arguments());
-  EXPECT_EQ(server.wait_for_exit(patience), 1);
+  EXPECT_EQ(server.wait_for_exit(patience), 2);
   return testing::internal::GetCapturedStderr();
 }
 

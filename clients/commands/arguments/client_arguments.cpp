@@ -58,8 +58,9 @@ void add_client_options(CommandHandle command, ClientArguments& arguments) {
       .option("--security", arguments.security,
               "Folder of our identity in a secured domain (stillmap security init)")
       .from_environment("STILLMAP_SECURITY");
+  constexpr int seconds_of_a_day = 86400;
   command.option("--timeout", arguments.timeout_s, "Longest wait for the server [s]")
-      .above_zero()
+      .above_zero_to(seconds_of_a_day)
       .with_default();
 }
 

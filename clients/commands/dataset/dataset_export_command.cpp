@@ -138,7 +138,7 @@ void add_dataset_export_command(CommandHandle dataset, Action& action) {
   command
       .option("--idle-timeout", arguments->idle_timeout_s,
               "Live: end when no scan has followed the last one for so long [s]")
-      .above_zero()
+      .above_zero_to(86400)
       .with_default();
   add_client_options(command, arguments->client);
   command.explain(

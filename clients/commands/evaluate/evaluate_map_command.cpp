@@ -172,6 +172,7 @@ void add_evaluate_map_command(CommandHandle evaluate, Action& action) {
   command
       .option("--max-range", arguments->max_range_m,
               "True points farther from the lidar are left out [m]; as in the mapper")
+      .above_zero()
       .with_default();
   command.option("--voxel-size", arguments->voxel_size_m, "Of the true map [m]")
       .above_zero()

@@ -1,5 +1,8 @@
+#include <filesystem>
 #include <iostream>
 #include <memory>
+#include <stdexcept>
+#include <system_error>
 
 #include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/command.hpp"
@@ -52,6 +55,15 @@ std::string frame_warning(const evaluation::PosePairs& pairs) {
          ": one file may be in the camera frame (give --truth-calib or --estimate-calib)";
 }
 
+/// Throws std::invalid_argument where there can be none.
+void make_folder(const std::string& pictures) {
+  std::error_code error;
+  std::filesystem::create_directories(pictures, error);
+  if (!error) return;
+  throw std::invalid_argument("--pictures " + pictures + ": no folder can be made there (" +
+                              error.message() + "); name a folder");
+}
+
 ExitCode run(const EvaluateTrajectoryArguments& arguments) {
   PoseFile truth = read_in_frame(arguments.truth, arguments.truth_calib);
   // From poses of the lidar to those of the robot, whose map is where its own first pose is.
@@ -64,11 +76,11 @@ ExitCode run(const EvaluateTrajectoryArguments& arguments) {
   const std::string frame = is_mounted ? "base" : converted ? "lidar" : arguments.frame;
   const evaluation::PosePairs pairs =
       pair_poses(truth, estimate, static_cast<std::int64_t>(1e9 * arguments.max_difference_s));
+  if (!arguments.pictures.empty()) make_folder(arguments.pictures);
   const TrajectoryReport report = report_trajectory(pairs);
   const std::string warning = frame_warning(pairs);
   if (!warning.empty()) std::cerr << "stillmap: warning: " << warning << "\n";
   if (!arguments.pictures.empty()) {
-    std::filesystem::create_directories(arguments.pictures);
     draw_trajectories(arguments.pictures, pairs, report,
                       frame == "camera" ? GroundPlane::xz : GroundPlane::xy);
   }
@@ -107,6 +119,7 @@ void add_evaluate_trajectory_command(CommandHandle evaluate, Action& action) {
   command
       .option("--max-difference", arguments->max_difference_s,
               "Poses with stamps pair when at most this far apart [s]")
+      .above_zero_to(3600)
       .with_default();
   command.option("--pictures", arguments->pictures,
                  "Folder for trajectory.png and trajectory_error.png");

@@ -1,10 +1,13 @@
 #include <cmath>
 #include <deque>
+#include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <memory>
 #include <mutex>
 #include <numbers>
 #include <optional>
+#include <system_error>
 #include <utility>
 
 #include "clients/commands/arguments/client_arguments.hpp"
@@ -14,6 +17,7 @@
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
+#include "core/dataset/dataset_error.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -125,7 +129,20 @@ class Watch {
   std::string frame_;
 };
 
+/// Throws DatasetWriteError for a file that will not take the poses when they are there; what is in
+/// it stays.
+void check_writable(const std::filesystem::path& file) {
+  std::error_code unknown;
+  // Its reader would take this for the end.
+  if (std::filesystem::is_fifo(file, unknown)) return;
+  const bool is_new = !std::filesystem::exists(file, unknown);
+  if (!std::ofstream(file, std::ios::app))
+    throw DatasetWriteError(file, "cannot be written; check the folder and its permissions");
+  if (is_new) std::filesystem::remove(file, unknown);
+}
+
 ExitCode run(const WatchArguments& arguments) {
+  if (!arguments.out.empty()) check_writable(arguments.out);
   StopSignal stop;
   Client client = connect(arguments.client);
   UpdateQueue updates;

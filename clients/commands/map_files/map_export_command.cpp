@@ -6,6 +6,7 @@
 #include "clients/commands/query/query_report.hpp"
 #include "clients/commands/query/region_arguments.hpp"
 #include "clients/terminal/json.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/map/tools/map_export.hpp"
 #include "core/map/tools/outlier_removal.hpp"
@@ -35,6 +36,16 @@ void check_output_name(const std::string& file) {
   const bool is_octree = file.ends_with(".bt") || file.ends_with(".ot");
   throw std::invalid_argument("--output " + file + ": the name must end in .pcd, .ply or .tif" +
                               (is_octree ? "; OctoMap files come from stillmap octomap" : ""));
+}
+
+/// Throws std::invalid_argument for what is no datum, and for one that no file takes.
+void check_datum(const MapExportArguments& arguments) {
+  if (arguments.datum.empty()) return;
+  static_cast<void>(datum_from_text(arguments.datum));
+  if (is_raster_name(arguments.output)) return;
+  throw std::invalid_argument("--datum " + arguments.datum + " is of a GeoTIFF, and --output " +
+                              arguments.output +
+                              " is none: leave it out, or name a file that ends in .tif");
 }
 
 MapQuery query_of(const MapExportArguments& arguments, const SavedMap& map) {
@@ -83,7 +94,9 @@ void write(const MapExportArguments& arguments, const SavedMap& map,
 
 ExitCode run(const MapExportArguments& arguments) {
   check_output_name(arguments.output);
+  check_datum(arguments);
   check_region(arguments.region);
+  end_cleanly_when_stopped();
   const SavedMap map = read_map_file(arguments.file);
   std::vector<QueryVoxel> voxels = voxels_of(map.view, query_of(arguments, map));
   const std::size_t found = voxels.size();
@@ -124,16 +137,19 @@ void add_map_export_command(CommandHandle program, Action& action) {
       .comma_separated();
   command.option("--resolution", arguments->resolution_m,
                  "Voxel size of the export [m]; default: the map's own");
-  command
-      .option("--remove-outliers", arguments->outlier_sigma,
+  const OptionHandle remove_outliers =
+      command
+          .option(
+              "--remove-outliers", arguments->outlier_sigma,
               "SIGMA: without voxels whose mean distance to their nearest others is more than so "
               "many standard deviations above the mean")
-      .above_zero();
+          .above_zero();
   command
       .option("--outlier-neighbours", arguments->outlier_neighbours,
               "How many others --remove-outliers looks at")
       .with_default()
-      .between(1, 1000);
+      .between(1, 1000)
+      .needs(remove_outliers);
   command.option("--datum", arguments->datum,
                  "Of a GeoTIFF: LATITUDE,LONGITUDE[,ALTITUDE[,AZIMUTH]] of the map's origin and "
                  "where its x axis points, clockwise from north (90, east); default: the file's "

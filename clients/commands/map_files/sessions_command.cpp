@@ -7,6 +7,7 @@
 
 #include "clients/commands/command.hpp"
 #include "clients/terminal/json.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/map/storage/map_lock.hpp"
 #include "core/map/storage/map_sessions.hpp"
@@ -55,12 +56,6 @@ std::string sessions_table(const std::vector<MapSession>& sessions) {
 
 /// Throws std::invalid_argument where the session cannot be withdrawn into this file.
 void check_withdrawal(const SessionsArguments& arguments, const std::vector<MapSession>& sessions) {
-  if (arguments.out.empty()) {
-    throw std::invalid_argument(
-        "--withdraw needs --out: the map without the session is written "
-        "there, and " +
-        arguments.file + " stays as it is");
-  }
   std::error_code not_there;
   if (std::filesystem::equivalent(arguments.file, arguments.out, not_there)) {
     throw std::invalid_argument(arguments.out +
@@ -80,10 +75,16 @@ void check_withdrawal(const SessionsArguments& arguments, const std::vector<MapS
 }
 
 ExitCode run(const SessionsArguments& arguments) {
+  if (arguments.withdraw != 0 && arguments.out.empty()) {
+    throw std::invalid_argument(
+        "--withdraw needs --out: the map without the session is written there, and " +
+        arguments.file + " stays as it is");
+  }
+  end_cleanly_when_stopped();
   std::vector<MapSession> sessions = read_map_sessions(arguments.file);
   if (arguments.withdraw != 0) {
-    check_withdrawal(arguments, sessions);
     const MapLock lock(arguments.out);
+    check_withdrawal(arguments, sessions);
     withdraw_newest_session(arguments.file, arguments.out);
     sessions.pop_back();
   }
@@ -102,12 +103,15 @@ void add_sessions_command(CommandHandle program, Action& action) {
   CommandHandle command = program.command(
       "sessions", "List the drives that a map file is made of, and withdraw the newest");
   command.option("FILE", arguments->file, "A map file; it is only read").required();
-  command
-      .option("--withdraw", arguments->withdraw,
-              "Number of the newest session: write the map as it was before it")
-      .above_zero();
-  command.option("--out", arguments->out, "Where the map without the session is written");
-  command.flag("--force", arguments->force, "Replace the file --out where it exists");
+  const OptionHandle withdraw =
+      command
+          .option("--withdraw", arguments->withdraw,
+                  "Number of the newest session: write the map as it was before it")
+          .above_zero();
+  command.option("--out", arguments->out, "Where the map without the session is written")
+      .needs(withdraw);
+  command.flag("--force", arguments->force, "Replace the file --out where it exists")
+      .needs(withdraw);
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"

@@ -33,6 +33,7 @@
 #include "core/map/storage/map_sessions.hpp"
 #include "core/map/tools/map_export.hpp"
 #include "core/picture/map_picture.hpp"
+#include "idl/bag/bag.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -208,7 +209,7 @@ void write_report(const std::filesystem::path& file, const Json& report) {
 
 /// Throws std::invalid_argument for what is not FROM:TO or not of this run's scans, and where loops
 /// are left open.
-std::vector<DeniedLoop> denied_loops(const MapArguments& arguments) {
+std::vector<DeniedLoop> denied_loops(const MapArguments& arguments, const ScanDataset& dataset) {
   if (!arguments.denied_loops.empty() && arguments.loops != "on")
     throw std::invalid_argument("--deny-loop needs --loops on: nothing is closed without it");
   std::vector<DeniedLoop> all;
@@ -225,11 +226,11 @@ std::vector<DeniedLoop> denied_loops(const MapArguments& arguments) {
                                   ": must be FROM:TO, two scans of which the second came later, "
                                   "as 'stillmap loops' lists them");
     }
-    const std::size_t count = arguments.range.count;
-    if (denied.from_scan < arguments.range.first ||
-        (count != SIZE_MAX && denied.to_scan >= arguments.range.first + count)) {
-      throw std::invalid_argument("--deny-loop " + text +
-                                  ": is not of the scans that --start and --scans take");
+    const std::size_t after_last = arguments.range.end(dataset);
+    if (denied.from_scan < arguments.range.first || denied.to_scan >= after_last) {
+      throw std::invalid_argument("--deny-loop " + text + ": is not of the scans to be mapped, " +
+                                  std::to_string(arguments.range.first) + " to " +
+                                  std::to_string(after_last - 1));
     }
     all.push_back(denied);
   }
@@ -265,10 +266,19 @@ GnssOptions gnss_options(const MapArguments& arguments, const ScanDataset& datas
   return options;
 }
 
+/// FNV-1a of a file's bytes, which tells one text from another.
+std::uint64_t digest_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::uint64_t digest = 0xcbf29ce484222325U;
+  for (char byte = 0; in.get(byte);)
+    digest = (digest ^ static_cast<unsigned char>(byte)) * 0x100000001b3U;
+  return digest;
+}
+
 /// What makes the parts of a run one map.
-RunIdentity run_identity(const MapArguments& arguments, const MapperConfig& config,
-                         const MappedBody& body, const Segmenter& labels,
-                         const EarlierMap* earlier) {
+RunIdentity run_identity(const MapArguments& arguments, const ScanDataset& dataset,
+                         const MapperConfig& config, const MappedBody& body,
+                         const Segmenter& labels, const EarlierMap* earlier) {
   const Eigen::Vector3d t = body.T_body_lidar.translation();
   const Eigen::Quaterniond q(body.T_body_lidar.rotation());
   std::ostringstream settings;
@@ -280,8 +290,13 @@ RunIdentity run_identity(const MapArguments& arguments, const MapperConfig& conf
            << (earlier == nullptr ? "" : ", onto " + earlier->identity());
   for (const double metres : arguments.antenna) settings << ", antenna " << metres;
   for (const std::string& denied : arguments.denied_loops) settings << ", not " << denied;
-  return {std::filesystem::weakly_canonical(arguments.dataset).string() + " from scan " +
-              std::to_string(arguments.range.first),
+  if (!arguments.mapper.config_file.empty())
+    settings << ", configuration of digest " << digest_of(arguments.mapper.config_file);
+  // A bag's scans bear the name of their topic, whether or not the command line says it.
+  const std::filesystem::path recording = std::filesystem::weakly_canonical(
+      dds::is_bag(arguments.dataset) ? dataset.file(arguments.range.first).parent_path()
+                                     : std::filesystem::path(arguments.dataset));
+  return {recording.string() + " from scan " + std::to_string(arguments.range.first),
           settings.str()};
 }
 
@@ -290,11 +305,11 @@ MappingResult map_into(const MapOutputFolder& out, const ScanDataset& dataset,
                        const MapArguments& arguments, const MapperConfig& config,
                        const MappedBody& body, std::unique_ptr<Segmenter> labels,
                        const EarlierMap* earlier, StopSignal& stop) {
-  RunFile run_file(out.run_file(), run_identity(arguments, config, body, *labels, earlier),
+  RunFile run_file(out.run_file(), run_identity(arguments, dataset, config, body, *labels, earlier),
                    std::chrono::duration<double>(arguments.save_period_s));
   std::optional<LoopOptions> loops;
   if (arguments.loops == "on")
-    loops = {out.kept_scans_file(), denied_loops(arguments),
+    loops = {out.kept_scans_file(), denied_loops(arguments, dataset),
              gnss_options(arguments, dataset, body)};
   return map_with_progress(dataset, arguments, config, body, std::move(labels), run_file, loops,
                            earlier, stop);
@@ -342,7 +357,7 @@ ExitCode run(const MapArguments& arguments) {
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
   const MappedBody body = body_of(arguments.mount, arguments.mapper.config_file);
   static_cast<void>(arguments.range.end(dataset));
-  static_cast<void>(denied_loops(arguments));
+  static_cast<void>(denied_loops(arguments, dataset));
   static_cast<void>(gnss_options(arguments, dataset, body));
   static_cast<void>(dataset.truth());
   auto labels = make_segmenter(arguments.mapper, dataset);
@@ -394,11 +409,12 @@ void add_gnss_options(CommandHandle command, MapArguments& arguments) {
 }
 
 void add_save_option(CommandHandle command, MapArguments& arguments) {
+  constexpr int seconds_of_a_year = 365 * 86400;
   command
       .option("--save-period", arguments.save_period_s,
               "Seconds between saves of the run, for --resume")
       .with_default()
-      .above_zero();
+      .above_zero_to(seconds_of_a_year);
 }
 
 void add_map_command(CommandHandle program, Action& action) {
@@ -416,7 +432,7 @@ void add_map_command(CommandHandle program, Action& action) {
   command.flag("--strict", arguments->range.strict,
                "Stop at the first damaged file instead of skipping it");
   command.flag("--force", arguments->policy.force,
-               "Replace a map that is there already, once the new one is complete");
+               "Replace results that are there already, once the new ones are complete");
   command.flag("--resume", arguments->policy.resume,
                "Go on with the run that was stopped or killed in this folder");
   command

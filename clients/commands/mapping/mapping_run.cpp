@@ -240,6 +240,16 @@ class MappingRun {
   MappingResult result_;
 };
 
+/// Throws std::invalid_argument where an earlier run has mapped more scans than are asked for now.
+void check_resumed(std::size_t next_scan, const ScanRange& range, std::size_t end) {
+  if (next_scan <= end) return;
+  const std::string seen = std::to_string(next_scan - range.first);
+  throw std::invalid_argument("the unfinished run has seen " + seen + " scans from number " +
+                              std::to_string(range.first) + " on, more than the " +
+                              std::to_string(end - range.first) + " that are asked for: ask for " +
+                              seen + " or more (--scans), or begin anew with --force");
+}
+
 }  // namespace
 
 std::size_t ScanRange::end(const ScanDataset& dataset) const {
@@ -265,6 +275,7 @@ MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
   if (auto earlier = run_file.earlier();
       earlier && earlier->scan_of_pose.size() >= min_resumed_scans) {
     index = earlier->next_scan;
+    check_resumed(index, range, end);
     run.resume(*std::move(earlier));
   } else {
     run.begin(index);

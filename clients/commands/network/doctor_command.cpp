@@ -182,7 +182,7 @@ void add_doctor_command(CommandHandle program, Action& action) {
               "The sensor's topic, where no server tells it by itself")
       .with_default();
   command.option("--listen", arguments->listening_s, "How long to listen to the network [s]")
-      .above_zero()
+      .above_zero_to(3600)
       .with_default();
   command
       .option("--host-root", arguments->host_root,

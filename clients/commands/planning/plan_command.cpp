@@ -232,12 +232,14 @@ void add_plan_command(CommandHandle program, Action& action) {
   command.option("--output", arguments->output, "Write the path to FILE.json or FILE.csv");
   command.option("--picture", arguments->picture,
                  "Draw the traversability and the path to FILE.png");
-  command.flag("--follow", arguments->follow,
-               "Stay subscribed and plan again when the path is blocked or the route changes; "
-               "says why");
+  const OptionHandle follow =
+      command.flag("--follow", arguments->follow,
+                   "Stay subscribed and plan again when the path is blocked or the route changes; "
+                   "says why");
   command.option("--duration", arguments->duration_s, "End --follow after as many seconds")
-      .above_zero();
-  command.option("--count", arguments->count, "End --follow after as many plans");
+      .above_zero()
+      .needs(follow);
+  command.option("--count", arguments->count, "End --follow after as many plans").needs(follow);
   command.flag("--json", arguments->json, "Print JSON; with --follow a line for every plan");
   add_search_options(command, *arguments);
   add_client_options(command, arguments->client);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -146,7 +147,8 @@ struct OctomapArguments {
   ClientArguments client;
   /// Instead of a server.
   std::string map;
-  double resolution_m = 0.2;
+  /// 0: not given.
+  double resolution_m = 0.0;
   std::string output;
   std::vector<double> points;
   std::vector<double> boxes;
@@ -192,24 +194,36 @@ OccupancyQuery query_of(const OctomapArguments& arguments) {
   return query;
 }
 
+std::size_t refused(const OccupancyAnswers& answers) {
+  const auto count = [](const auto& some) {
+    return std::ranges::count_if(some, [](const auto& answer) { return !answer.fault.empty(); });
+  };
+  return static_cast<std::size_t>(count(answers.points) + count(answers.boxes) +
+                                  count(answers.rays));
+}
+
 /// The octree of a stored static map, or of a file of OctoMap's.
 OccupancyMap open_map(const OctomapArguments& arguments) {
   const std::filesystem::path file = arguments.map;
   if (file.extension() == ".bt" || file.extension() == ".ot") {
+    if (arguments.resolution_m != 0.0) {
+      throw std::invalid_argument("--resolution is for a .stillmap map; " + arguments.map +
+                                  " has a resolution of its own: leave it out");
+    }
     return OccupancyMap(read_octomap_file(file));
   }
   if (!std::filesystem::exists(file)) {
     throw MapFileError(file, "does not exist; 'stillmap map' writes map files");
   }
   OccupancyConfig config;
-  config.resolution_m = arguments.resolution_m;
+  if (arguments.resolution_m != 0.0) config.resolution_m = arguments.resolution_m;
   OccupancyMap map(config);
   const SavedMap saved = read_map_file(file);
   if (const std::size_t left_out = map.insert(saved.view); left_out > 0) {
     throw MapFileError(file, "has " + std::to_string(left_out) + " voxels farther than " +
                                  fixed(map.reach_m(), 0) +
                                  " m from its origin, where an octree of --resolution " +
-                                 fixed(arguments.resolution_m, 3) + " ends; choose a coarser one");
+                                 fixed(config.resolution_m, 3) + " ends; choose a coarser one");
   }
   return map;
 }
@@ -244,8 +258,9 @@ ExitCode run(const OctomapArguments& arguments) {
   OccupancySource source(arguments);
   Json report;
   std::string text;
+  OccupancyAnswers answers;
   if (asks) {
-    const OccupancyAnswers answers = source.answer(query);
+    answers = source.answer(query);
     report.set("answers", to_json(answers));
     text += describe(query, answers);
   }
@@ -260,7 +275,7 @@ ExitCode run(const OctomapArguments& arguments) {
     }
   }
   std::cout << (arguments.json ? report.dump(2) + "\n" : text);
-  return ExitCode::ok;
+  return refused(answers) == 0 ? ExitCode::ok : ExitCode::bad_input;
 }
 
 }  // namespace
@@ -271,11 +286,16 @@ void add_octomap_command(CommandHandle program, Action& action) {
       "octomap", "Occupied, free and unknown space: queries, and files for octovis");
   command.option("--output", arguments->output,
                  "Write the octree to FILE.bt (occupied and free) or FILE.ot (probabilities)");
-  command.option("--map", arguments->map,
-                 "Take a stored map (.stillmap: its static voxels are occupied, all else is "
-                 "unknown) or an OctoMap file (.bt, .ot) instead of a server");
-  command.option("--resolution", arguments->resolution_m, "Voxel size for a .stillmap map [m]")
-      .with_default();
+  const OptionHandle map =
+      command.option("--map", arguments->map,
+                     "Take a stored map (.stillmap: its static voxels are occupied, all else is "
+                     "unknown) or an OctoMap file (.bt, .ot) instead of a server");
+  command
+      .option("--resolution", arguments->resolution_m,
+              "Voxel size for a .stillmap map [m]; default: " +
+                  fixed(OccupancyConfig{}.resolution_m, 1))
+      .above_zero()
+      .needs(map);
   command.option("--point", arguments->points, "x,y,z: occupied, free or unknown?")
       .comma_separated();
   command
@@ -303,7 +323,8 @@ void add_octomap_command(CommandHandle program, Action& action) {
       "  stillmap octomap --point 5,0,0.5 --ray 0,0,0,1,0,0 --max-range 30\n"
       "  stillmap octomap --map city.bt --box -2,-2,0,2,2,2 --json\n"
       "Coordinates are in the map frame [m]. --point, --box and --ray may be given several times;\n"
-      "without any, what the octree holds is printed. Free is only what a ray passed.");
+      "without any, what the octree holds is printed. Free is only what a ray passed. Exit code 2\n"
+      "when any of them cannot be asked, as a point outside the octree; the others are answered.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

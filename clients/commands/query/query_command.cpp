@@ -106,10 +106,13 @@ void add_query_command(CommandHandle program, Action& action) {
       .comma_separated();
   command.option("--resolution", arguments->resolution_m,
                  "Voxel size of the answer [m]; default: the map's own");
-  command.option("--since-version", arguments->since_version,
-                 "Only tiles that appeared or changed since this version; names those removed");
-  command.option("--since-map", arguments->since_map,
-                 "Id of the map that the version is of; default: the server's current map");
+  const OptionHandle since_version =
+      command.option("--since-version", arguments->since_version,
+                     "Only tiles that appeared or changed since this version; names those removed");
+  command
+      .option("--since-map", arguments->since_map,
+              "Id of the map that the version is of; default: the server's current map")
+      .needs(since_version);
   command.option("--out", arguments->out, "Write the voxels to FILE.pcd or FILE.ply");
   command.option("--picture", arguments->picture,
                  "Draw the whole map from above, the path and the region, to FILE.png");

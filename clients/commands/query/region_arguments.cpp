@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
+#include <system_error>
 
 #include "clients/commands/query/fetch_map.hpp"
 
@@ -45,6 +47,9 @@ std::vector<Eigen::Vector2d> points_in_file(const std::string& option, const std
     throw std::invalid_argument(option + " " + file +
                                 ": neither numbers, x y x y and so on, nor a file to be read");
   }
+  std::error_code unknown;
+  if (std::filesystem::is_directory(file, unknown))
+    throw std::invalid_argument(option + " " + file + ": is a folder; name a file of points in it");
   std::vector<Eigen::Vector2d> points;
   int line_number = 0;
   for (std::string line; std::getline(in, line);) {
@@ -116,7 +121,9 @@ Kinds add_kinds(CommandHandle command, RegionArguments& region) {
   for (std::size_t i = 0; i < kinds.size(); ++i) {
     for (std::size_t j = i + 1; j < kinds.size(); ++j) kinds.at(i).excludes(kinds.at(j));
   }
-  command.option("--width", region.width_m, "Whole width of the corridor [m]").above_zero();
+  command.option("--width", region.width_m, "Whole width of the corridor [m]")
+      .above_zero()
+      .needs(kinds[5]);
   return {.box = kinds[0], .sphere = kinds[3]};
 }
 
@@ -157,6 +164,12 @@ void add_region_options(CommandHandle command, RegionArguments& region) {
 Region region_at(const RegionArguments& arguments, const Eigen::Vector2d& robot_map) {
   if (!arguments.corridor.empty() && arguments.width_m == 0.0) {
     throw std::invalid_argument("--corridor needs --width, the corridor's whole width [m]");
+  }
+  if (!arguments.around.empty() && !(arguments.around[2] > 0.0)) {
+    std::ostringstream size;
+    size << arguments.around[2];
+    throw std::invalid_argument("--around has the SIZE " + size.str() +
+                                "; it must be above 0 m, the side of a square");
   }
   Region region = chosen_region(arguments, robot_map);
   if (const std::string faults = region_faults(region); !faults.empty()) {

@@ -96,12 +96,29 @@ RemovalReason reason_from_name(const std::string& text) {
                               "relabelled");
 }
 
+/// Throws std::invalid_argument for options that do not go with --restore: nobody shows the whole
+/// map's removed voxels again by leaving out the box.
+void check_restore(const RemovedArguments& arguments) {
+  static_cast<void>(reason_from_name(arguments.restore));
+  if (!arguments.map_file.empty())
+    throw std::invalid_argument("--restore needs a server; leave MAPFILE out");
+  const RegionArguments& region = arguments.region;
+  if (region.box.empty() && region.around.empty() && region.around_robot_m == 0.0) {
+    throw std::invalid_argument("--restore " + arguments.restore +
+                                " needs the box to restore: give --box, --around or "
+                                "--around-robot");
+  }
+  if (!arguments.picture.empty()) {
+    throw std::invalid_argument("--picture " + arguments.picture +
+                                " shows what is removed and goes not with --restore; draw it "
+                                "before or after");
+  }
+}
+
 ExitCode restore(Client& client, const RemovedArguments& arguments) {
-  const RemovalReason reason = reason_from_name(arguments.restore);
   const Region region = region_of(arguments.region, client, arguments.client.timeout());
-  const auto* const box = std::get_if<BoxRegion>(&region);
-  if (box == nullptr) throw std::invalid_argument("--restore takes a --box or --around");
-  const std::uint64_t restored = client.restore_removed(reason, *box);
+  const std::uint64_t restored =
+      client.restore_removed(reason_from_name(arguments.restore), std::get<BoxRegion>(region));
   if (arguments.json) {
     std::cout << Json{{"restored", restored}}.dump(2) << "\n";
   } else {
@@ -112,12 +129,10 @@ ExitCode restore(Client& client, const RemovedArguments& arguments) {
 
 ExitCode run(const RemovedArguments& arguments) {
   check_region(arguments.region);
+  if (!arguments.restore.empty()) check_restore(arguments);
   std::optional<Client> client;
   if (arguments.map_file.empty()) client.emplace(connect(arguments.client));
-  if (!arguments.restore.empty()) {
-    if (!client) throw std::invalid_argument("--restore needs a server; leave MAPFILE out");
-    return restore(*client, arguments);
-  }
+  if (!arguments.restore.empty()) return restore(*client, arguments);
   const RemovedResult found =
       client ? removed_on_server(*client, arguments) : removed_in_file(arguments);
   if (!arguments.picture.empty()) {
@@ -138,8 +153,8 @@ void add_removed_command(CommandHandle program, Action& action) {
   command.option("--picture", arguments->picture,
                  "Write a PNG: the map in grey, what was removed by reason");
   command.option("--restore", arguments->restore,
-                 "Have the server show again what was removed for this reason in the box: moving, "
-                 "semi-static, 'seen through' or relabelled");
+                 "Have the server show again what was removed for this reason in the box of --box, "
+                 "--around or --around-robot: moving, semi-static, 'seen through' or relabelled");
   add_client_options(command, arguments->client);
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(

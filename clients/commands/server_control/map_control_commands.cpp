@@ -100,11 +100,12 @@ void add_load_command(CommandHandle program, Action& action) {
       "Examples:\n"
       "  stillmap save before_rain.stillmap && stillmap load before_rain.stillmap\n"
       "  stillmap load depot.stillmap --json | jq .map_id\n"
-      "The running map is saved to its own file first. From then on the server maps in FILE and\n"
-      "saves to it, under a new map id; the next scan is expected where FILE's path ends, so the\n"
-      "robot must stand there. A file that is missing, damaged, written by a newer version or of\n"
-      "another voxel size is refused, and the running map stays. A server that starts again\n"
-      "begins with its configured file.");
+      "The running map is saved to its own file first; only where FILE is that file, the map goes\n"
+      "back to what was saved there last, and what was mapped since is gone. From then on the\n"
+      "server maps in FILE and saves to it, under a new map id; the next scan is expected where\n"
+      "FILE's path ends, so the robot must stand there. A file that is missing, damaged, written\n"
+      "by a newer version or of another voxel size is refused, and the running map stays. A\n"
+      "server that starts again begins with its configured file.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
