@@ -54,6 +54,8 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
   /// For the next request of a connection to come whole, and for an answer to be taken.
   static constexpr std::chrono::seconds request_timeout{15};
   static constexpr std::chrono::seconds answer_timeout{60};
+  /// For a refused request to end.
+  static constexpr std::chrono::seconds drop_timeout{2};
   static constexpr std::uint32_t max_header_bytes = 16384;
 
   void read() {
@@ -64,8 +66,24 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
     boost::beast::http::async_read(
         stream_, buffer_, *parser_,
         [self = this->shared_from_this()](error_code error, std::size_t) {
-          if (!error) self->answer();
+          if (!error) return self->answer();
+          self->refuse(error);
         });
+  }
+
+  /// Of what cannot be read, answers what is HTTP.
+  void refuse(error_code error) {
+    namespace http = boost::beast::http;
+    const bool has_body = error == http::error::body_limit;
+    if (!has_body && error != http::error::header_limit) return;
+    HttpResponse refusal = has_body
+                               ? text_response({}, http::status::payload_too_large,
+                                               "Requests have no body: GET is answered.\n")
+                               : text_response({}, http::status::request_header_fields_too_large,
+                                               "Headers have 16 KiB at most.\n");
+    refusal.keep_alive(false);
+    is_unread_ = true;
+    write(std::move(refusal));
   }
 
   void answer() {
@@ -118,6 +136,19 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
           boost::beast::get_lowest_layer(self->stream_)
               .socket()
               .shutdown(boost::asio::ip::tcp::socket::shutdown_send, has_gone);
+          if (error || !self->is_unread_) return;
+          boost::beast::get_lowest_layer(self->stream_).expires_after(drop_timeout);
+          self->drop_rest();
+        });
+  }
+
+  /// A socket that is closed with bytes unread takes the answer from who still sends.
+  void drop_rest() {
+    buffer_.clear();
+    boost::beast::get_lowest_layer(stream_).async_read_some(
+        buffer_.prepare(max_header_bytes),
+        [self = this->shared_from_this()](error_code error, std::size_t) {
+          if (!error) self->drop_rest();
         });
   }
 
@@ -140,6 +171,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::string_body>> parser_;
   std::optional<HttpResponse> response_;
+  bool is_unread_ = false;
 };
 
 }  // namespace stillmap::gateway

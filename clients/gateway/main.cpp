@@ -11,6 +11,7 @@
 #include "clients/gateway/gateway.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "config/loaders/listening_address.hpp"
+#include "config/loaders/topic_name.hpp"
 #include "idl/dds/dds_log.hpp"
 
 namespace {
@@ -147,12 +148,15 @@ void add_options(stillmap::cli::CommandHandle command, Arguments& arguments) {
   command.option("--page", arguments.page,
                  "Folder of the page, instead of the one that came along");
   command.flag("--no-page", arguments.no_page, "Foxglove's protocol only");
-  command.option("--points", arguments.gateway.topics.points, "The sensor's topic").with_default();
-  command
-      .option("--odometry", arguments.gateway.topics.odometry_prior, "The odometry prior's topic")
-      .with_default();
-  command.option("--imu", arguments.gateway.topics.imu, "The IMU's topic").with_default();
-  command.option("--gnss", arguments.gateway.topics.gnss, "A GNSS receiver's topic").with_default();
+  const auto add_topic = [&](const char* option, std::string& topic, const char* whose) {
+    command.option(option, topic, std::string(whose) + " topic")
+        .corrected(stillmap::to_topic_name)
+        .with_default();
+  };
+  add_topic("--points", arguments.gateway.topics.points, "The sensor's");
+  add_topic("--odometry", arguments.gateway.topics.odometry_prior, "The odometry prior's");
+  add_topic("--imu", arguments.gateway.topics.imu, "The IMU's");
+  add_topic("--gnss", arguments.gateway.topics.gnss, "A GNSS receiver's");
   stillmap::cli::add_client_options(command, arguments.client);
   command.explain(
       "Examples:\n"

@@ -59,6 +59,43 @@ std::vector<Eigen::Vector2d> positions_from(const InArray<double>& array, const 
   return positions;
 }
 
+py::array whole_numbers(const py::object& given, const std::string& name, std::int64_t least,
+                        std::int64_t most) {
+  const auto array = py::array::ensure(given);
+  if (!array) throw std::invalid_argument(name + " is no array of numbers");
+  // An empty list becomes an array of float64.
+  if (array.size() == 0) return array;
+  const std::string wanted = "; whole numbers from " + std::to_string(least) + " to " +
+                             std::to_string(most) + " are wanted";
+  const char kind = array.dtype().kind();
+  if (kind != 'i' && kind != 'u' && kind != 'b') {
+    throw std::invalid_argument(name + " has the type " +
+                                std::string(py::str(py::object(array.dtype()))) + wanted);
+  }
+  const py::int_ smallest(array.attr("min")());
+  const py::int_ largest(array.attr("max")());
+  if (smallest < py::int_(least) || largest > py::int_(most)) {
+    const py::int_& outside = largest > py::int_(most) ? largest : smallest;
+    throw std::invalid_argument(name + " has the number " +
+                                std::string(py::str(py::object(outside))) + wanted);
+  }
+  return array;
+}
+
+std::vector<SemanticClass> classes_from(std::span<const std::int64_t> indexes,
+                                        const std::string& name) {
+  std::vector<SemanticClass> classes;
+  classes.reserve(indexes.size());
+  for (const std::int64_t index : indexes) {
+    if (index < 0 || index >= static_cast<std::int64_t>(semantic_class_count)) {
+      throw std::invalid_argument(name + " has the class " + std::to_string(index) +
+                                  "; there are 0 to " + std::to_string(semantic_class_count - 1));
+    }
+    classes.push_back(static_cast<SemanticClass>(index));
+  }
+  return classes;
+}
+
 Eigen::Isometry3d transform_from(const InArray<double>& array, const std::string& name) {
   if (array.ndim() != 2 || array.shape(0) != 4 || array.shape(1) != 4) {
     refuse_shape(name, array, "(4, 4)");
@@ -120,10 +157,12 @@ PythonTrajectory trajectory_of(const Trajectory& trajectory) {
   return {array_of<std::int64_t>(std::move(stamps_ns)), array_from(trajectory)};
 }
 
-Trajectory trajectory_from(const InArray<std::int64_t>& stamp_ns, const InArray<double>& T_map_body,
+Trajectory trajectory_from(const py::object& stamp_ns, const InArray<double>& T_map_body,
                            const std::string& name) {
   const auto transforms = transforms_from(T_map_body, name);
-  const auto stamps = values_from(std::optional(stamp_ns), name + "'s stamp_ns", transforms.size());
+  const std::string stamp_name = name + "'s stamp_ns";
+  const auto stamps =
+      values_from(integers_from<std::int64_t>(stamp_ns, stamp_name), stamp_name, transforms.size());
   Trajectory trajectory;
   for (std::size_t i = 0; i < stamps.size(); ++i) trajectory.push_back({stamps[i], transforms[i]});
   return trajectory;

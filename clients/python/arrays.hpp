@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -13,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "core/lidar/semantic_class.hpp"
 #include "core/lidar/trajectory.hpp"
 
 namespace stillmap::python {
@@ -58,6 +60,23 @@ std::vector<T> values_from(const std::optional<InArray<T>>& array, const std::st
   return {array->data(), array->data() + array->size()};
 }
 
+/// An array of whole numbers from `least` to `most`. Throws std::invalid_argument for others:
+/// NumPy's own conversion cuts fractions off, and wraps what does not fit.
+[[nodiscard]] py::array whole_numbers(const py::object& given, const std::string& name,
+                                      std::int64_t least, std::int64_t most);
+/// The same, of numbers that T holds; nothing where nothing was given.
+template <typename T>
+std::optional<InArray<T>> integers_from(const std::optional<py::object>& given,
+                                        const std::string& name) {
+  using Limits = std::numeric_limits<T>;
+  static_assert(Limits::is_integer && Limits::digits <= std::numeric_limits<std::int64_t>::digits);
+  if (!given) return std::nullopt;
+  return InArray<T>(whole_numbers(*given, name, Limits::min(), Limits::max()));
+}
+/// Throws std::invalid_argument for an index of CLASS_NAMES that there is not.
+[[nodiscard]] std::vector<SemanticClass> classes_from(std::span<const std::int64_t> indexes,
+                                                      const std::string& name);
+
 /// (4, 4); the last row is 0 0 0 1.
 [[nodiscard]] Eigen::Isometry3d transform_from(const InArray<double>& array,
                                                const std::string& name);
@@ -82,7 +101,7 @@ struct PythonTrajectory {
 };
 [[nodiscard]] PythonTrajectory trajectory_of(const Trajectory& trajectory);
 /// Throws std::invalid_argument where the lengths differ.
-[[nodiscard]] Trajectory trajectory_from(const InArray<std::int64_t>& stamp_ns,
+[[nodiscard]] Trajectory trajectory_from(const py::object& stamp_ns,
                                          const InArray<double>& T_map_body,
                                          const std::string& name);
 

@@ -94,8 +94,8 @@ void bind_sensor(py::module_& module) {
 DatasetFrame frame_from_arrays(const InArray<float>& points_lidar, std::int64_t stamp_ns,
                                const std::optional<InArray<float>>& intensity,
                                const std::optional<InArray<float>>& time_offset_s,
-                               const std::optional<InArray<std::uint16_t>>& ring,
-                               const std::optional<InArray<std::uint8_t>>& labels) {
+                               const std::optional<py::object>& ring,
+                               const std::optional<py::object>& labels) {
   DatasetFrame frame;
   Scan& scan = frame.scan;
   scan.stamp_ns = stamp_ns;
@@ -103,14 +103,9 @@ DatasetFrame frame_from_arrays(const InArray<float>& points_lidar, std::int64_t 
   const std::size_t size = scan.points_lidar.size();
   scan.intensity = values_from(intensity, "intensity", size);
   scan.time_offset_s = values_from(time_offset_s, "time_offset_s", size);
-  scan.ring = values_from(ring, "ring", size);
-  for (const std::uint8_t label : values_from(labels, "labels", size)) {
-    if (label >= semantic_class_count) {
-      throw std::invalid_argument("labels has the class " + std::to_string(label) +
-                                  "; there are 0 to " + std::to_string(semantic_class_count - 1));
-    }
-    scan.labels.push_back(static_cast<SemanticClass>(label));
-  }
+  scan.ring = values_from(integers_from<std::uint16_t>(ring, "ring"), "ring", size);
+  scan.labels = classes_from(
+      values_from(integers_from<std::int64_t>(labels, "labels"), "labels", size), "labels");
   return frame;
 }
 

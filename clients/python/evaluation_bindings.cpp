@@ -61,18 +61,21 @@ py::object kitti_error(const InArray<double>& truth, const InArray<double>& esti
   return fields;
 }
 
-std::vector<SemanticClass> classes_in(const InArray<std::uint8_t>& labels,
-                                      const std::string& name) {
-  std::vector<SemanticClass> classes;
-  for (const std::uint8_t label :
-       values_from(std::optional(labels), name, static_cast<std::size_t>(labels.size()))) {
-    if (label >= semantic_class_count) {
-      throw std::invalid_argument(name + " has the class " + std::to_string(label) +
-                                  "; there are 0 to 19");
-    }
-    classes.push_back(static_cast<SemanticClass>(label));
-  }
-  return classes;
+std::vector<SemanticClass> classes_in(const py::object& labels, const std::string& name) {
+  const auto indexes = integers_from<std::int64_t>(labels, name);
+  const auto size = static_cast<std::size_t>(indexes->size());
+  return classes_from(values_from(indexes, name, size), name);
+}
+
+/// SemanticKITTI has the instance in the upper half of a label.
+std::vector<std::uint16_t> ids_in(const py::object& labels, const std::string& name,
+                                  std::size_t size) {
+  const auto values = values_from(integers_from<std::uint32_t>(labels, name), name, size);
+  std::vector<std::uint16_t> ids;
+  ids.reserve(values.size());
+  for (const std::uint32_t label : values)
+    ids.push_back(static_cast<std::uint16_t>(label & 0xFFFF));
+  return ids;
 }
 
 py::array_t<std::uint64_t> counts_of(const ConfusionMatrix& matrix) {
@@ -86,11 +89,10 @@ py::array_t<std::uint64_t> counts_of(const ConfusionMatrix& matrix) {
   return counts;
 }
 
-py::dict cleaning_score(const InArray<float>& truth_points_map,
-                        const InArray<std::uint16_t>& truth_ids, const InArray<float>& points_map,
-                        double voxel_size_m) {
+py::dict cleaning_score(const InArray<float>& truth_points_map, const py::object& truth_ids,
+                        const InArray<float>& points_map, double voxel_size_m) {
   const auto truth_points = points_from(truth_points_map, "truth_points_map");
-  const auto ids = values_from(std::optional(truth_ids), "truth_ids", truth_points.size());
+  const auto ids = ids_in(truth_ids, "truth_ids", truth_points.size());
   const auto points = points_from(points_map, "points_map");
   evaluation::MapCleaningScore score;
   {
@@ -132,8 +134,7 @@ void bind_evaluation(py::module_& module) {
       .def(py::init<>())
       .def(
           "add",
-          [](ConfusionMatrix& matrix, const InArray<std::uint8_t>& truth,
-             const InArray<std::uint8_t>& predicted) {
+          [](ConfusionMatrix& matrix, const py::object& truth, const py::object& predicted) {
             matrix.add(classes_in(truth, "truth"), classes_in(predicted, "predicted"));
           },
           py::arg("truth"), py::arg("predicted"),

@@ -46,7 +46,7 @@ void bind_classes(py::module_& module) {
 void bind_trajectory(py::module_& module) {
   py::class_<PythonTrajectory>(module, "Trajectory",
                                "Poses in the order of time, one run after the other.")
-      .def(py::init([](const InArray<std::int64_t>& stamp_ns, const InArray<double>& T_map_body) {
+      .def(py::init([](const py::object& stamp_ns, const InArray<double>& T_map_body) {
              return trajectory_of(trajectory_from(stamp_ns, T_map_body, "T_map_body"));
            }),
            py::arg("stamp_ns"), py::arg("T_map_body"))

@@ -43,6 +43,11 @@ OptionHandle OptionHandle::with_default() {
   return *this;
 }
 
+OptionHandle OptionHandle::corrected(const std::function<std::string(std::string&)>& correct) {
+  option_->transform(CLI::Validator(correct, ""));
+  return *this;
+}
+
 OptionHandle OptionHandle::one_of(const std::vector<std::string>& values) {
   option_->check(CLI::IsMember(values));
   return *this;

@@ -23,6 +23,9 @@ class OptionHandle {
   OptionHandle required();
   /// The help shows the value that the variable has now.
   OptionHandle with_default();
+  /// `correct` makes the value that is meant of the word; what it returns is wrong usage, unless
+  /// empty.
+  OptionHandle corrected(const std::function<std::string(std::string&)>& correct);
   OptionHandle one_of(const std::vector<std::string>& values);
   OptionHandle above_zero();
   /// Above zero, and so much at most, which the help shows.

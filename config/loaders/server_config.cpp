@@ -10,6 +10,7 @@
 #include "config/loaders/named_file.hpp"
 #include "config/loaders/robot_profile.hpp"
 #include "config/loaders/sensor_file.hpp"
+#include "config/loaders/topic_name.hpp"
 #include "config/loaders/yaml_section.hpp"
 #include "core/frames/rigid_motion.hpp"
 #include "core/geodesy/datum.hpp"
@@ -177,13 +178,9 @@ void read_dds(YamlSection section, const fs::path& folder, DdsConfig& dds) {
   }
 }
 
-constexpr const char* topic_rule = "; ROS 2 names have letters, digits, '_', and '/' inside";
-
-bool is_topic_name(const std::string& name) {
-  constexpr const char* allowed =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_/";
-  return !name.empty() && name.find_first_not_of(allowed) == std::string::npos &&
-         name.front() != '/' && name.back() != '/' && name.find("//") == std::string::npos;
+/// What an entry with this name says when it is refused.
+std::string topic_fault(const std::string& name) {
+  return "'" + name + "'" + std::string(topic_rule);
 }
 
 /// Whether the file names the topic of the one lidar.
@@ -194,22 +191,21 @@ bool read_topics(YamlSection section, TopicsConfig& topics) {
   section.text("imu", topics.imu);
   section.text("gnss", topics.gnss);
   section.text("initial_pose", topics.initial_pose);
-  if (!is_topic_name(topics.points))
-    section.fault("points", "'" + topics.points + "'" + topic_rule);
+  if (!is_topic_name(topics.points)) section.fault("points", topic_fault(topics.points));
   if (!is_topic_name(topics.name_space)) {
-    section.fault("namespace", "'" + topics.name_space + "'" + topic_rule);
+    section.fault("namespace", topic_fault(topics.name_space));
   }
   if (!topics.odometry_prior.empty() && !is_topic_name(topics.odometry_prior)) {
-    section.fault("odometry_prior", "'" + topics.odometry_prior + "'" + topic_rule);
+    section.fault("odometry_prior", topic_fault(topics.odometry_prior));
   }
   if (!topics.imu.empty() && !is_topic_name(topics.imu)) {
-    section.fault("imu", "'" + topics.imu + "'" + topic_rule);
+    section.fault("imu", topic_fault(topics.imu));
   }
   if (!topics.gnss.empty() && !is_topic_name(topics.gnss)) {
-    section.fault("gnss", "'" + topics.gnss + "'" + topic_rule);
+    section.fault("gnss", topic_fault(topics.gnss));
   }
   if (!topics.initial_pose.empty() && !is_topic_name(topics.initial_pose)) {
-    section.fault("initial_pose", "'" + topics.initial_pose + "'" + topic_rule);
+    section.fault("initial_pose", topic_fault(topics.initial_pose));
   }
   return section.has("points");
 }
@@ -317,7 +313,7 @@ LidarConfig read_lidar(YamlSection& section, const fs::path& folder) {
   if (lidar.name.empty() || !is_word) {
     section.fault("name", "'" + lidar.name + "'; names have letters, digits and '_'");
   }
-  if (!is_topic_name(lidar.topic)) section.fault("topic", "'" + lidar.topic + "'" + topic_rule);
+  if (!is_topic_name(lidar.topic)) section.fault("topic", topic_fault(lidar.topic));
   return lidar;
 }
 

@@ -40,7 +40,7 @@ template <class T>
   return values;
 }
 
-/// Writes the values and nothing else. Throws DatasetError.
+/// Writes the values and nothing else. Throws DatasetWriteError.
 template <class T>
 void write_values(const std::filesystem::path& file, std::span<const T> values) {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -48,7 +48,7 @@ void write_values(const std::filesystem::path& file, std::span<const T> values) 
   out.write(reinterpret_cast<const char*>(values.data()),
             static_cast<std::streamsize>(values.size_bytes()));
   out.close();
-  if (!out) throw DatasetError(file, "cannot be written; check the folder and the space left");
+  if (!out) throw DatasetWriteError(file, "cannot be written; check the folder and the space left");
 }
 
 }  // namespace stillmap

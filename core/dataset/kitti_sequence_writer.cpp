@@ -20,7 +20,7 @@ Eigen::Isometry3d forward_camera_from_lidar() {
 void make_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (error) throw DatasetError(folder, "cannot be made: " + error.message());
+  if (error) throw DatasetWriteError(folder, "cannot be made: " + error.message());
 }
 
 std::string running_number(std::size_t index) {
@@ -42,9 +42,17 @@ void write_side_file(const std::filesystem::path& folder, const std::string& nam
 
 }  // namespace
 
+std::filesystem::path part_of_sequence_in(const std::filesystem::path& folder) {
+  for (const char* part : sequence_parts) {
+    if (std::filesystem::exists(folder / part)) return part;
+  }
+  return {};
+}
+
 KittiSequenceWriter::KittiSequenceWriter(const std::filesystem::path& folder) : folder_(folder) {
-  if (std::filesystem::exists(folder / "velodyne")) {
-    throw DatasetError(folder, "holds a sequence already; name another folder or remove this one");
+  if (const auto part = part_of_sequence_in(folder); !part.empty()) {
+    throw DatasetError(folder, "holds a sequence already (" + part.string() +
+                                   "); name another folder or remove this one");
   }
   make_folder(folder / "velodyne");
 }
@@ -52,12 +60,39 @@ KittiSequenceWriter::KittiSequenceWriter(const std::filesystem::path& folder) : 
 void KittiSequenceWriter::add(const Scan& scan, std::span<const std::uint32_t> raw_labels,
                               const Eigen::Isometry3d& T_map_lidar) {
   const std::string name = running_number(trajectory_.size());
+  try {
+    write_files(name, scan, raw_labels);
+  } catch (const DatasetError&) {
+    remove_files(name);
+    finish_if_possible();
+    throw;
+  }
+  trajectory_.push_back({scan.stamp_ns, T_map_lidar});
+}
+
+void KittiSequenceWriter::write_files(const std::string& name, const Scan& scan,
+                                      std::span<const std::uint32_t> raw_labels) const {
   write_kitti_bin(folder_ / "velodyne" / (name + ".bin"), scan);
   write_side_file(folder_ / "labels", name + ".label",
                   std::vector<std::uint32_t>(raw_labels.begin(), raw_labels.end()), scan.size());
   write_side_file(folder_ / "time_offsets", name + ".bin", scan.time_offset_s, scan.size());
   write_side_file(folder_ / "rings", name + ".bin", scan.ring, scan.size());
-  trajectory_.push_back({scan.stamp_ns, T_map_lidar});
+}
+
+void KittiSequenceWriter::remove_files(const std::string& name) const {
+  std::error_code ignored;
+  for (const char* folder : {"velodyne", "time_offsets", "rings"})
+    std::filesystem::remove(folder_ / folder / (name + ".bin"), ignored);
+  std::filesystem::remove(folder_ / "labels" / (name + ".label"), ignored);
+}
+
+void KittiSequenceWriter::finish_if_possible() const {
+  try {
+    finish();
+  } catch (const DatasetError&) {
+    // Whoever writes is told of the scan that could not be written.
+    return;
+  }
 }
 
 void KittiSequenceWriter::finish() const {

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "core/lidar/scan.hpp"
@@ -11,17 +13,27 @@
 
 namespace stillmap {
 
+/// Files and folders beside one another that are read as one sequence.
+inline constexpr std::array sequence_parts{
+    "velodyne",  "labels",    "labels.bak",      "rings",   "time_offsets", "calib.txt",
+    "times.txt", "poses.txt", "poses_lidar.txt", "imu.csv", "imu.txt",      "gnss.csv"};
+
+/// The first of them that the folder holds; empty where it holds none.
+[[nodiscard]] std::filesystem::path part_of_sequence_in(const std::filesystem::path& folder);
+
 /// Writes scans as a SemanticKITTI sequence: velodyne/, labels/, calib.txt, times.txt and
 /// poses.txt (camera frame, relative to the first scan, as KITTI has it). What .bin cannot hold
 /// goes into files of our own that ScanDataset reads back: time_offsets/NNNNNN.bin (float32 a
 /// point, seconds) and rings/NNNNNN.bin (uint16 a point).
 class KittiSequenceWriter {
  public:
-  /// Makes the folders. Throws DatasetError when that fails or `folder` holds a sequence already.
+  /// Makes the folders. Throws DatasetError when that fails or `folder` holds a part of a
+  /// sequence already.
   explicit KittiSequenceWriter(const std::filesystem::path& folder);
 
   /// Writes the next scan at once. `raw_labels` is empty or has one entry a point. Stamps must not
-  /// be negative: times.txt keeps them as they are. Throws DatasetError.
+  /// be negative: times.txt keeps them as they are. Throws DatasetError, and then leaves nothing of
+  /// this scan and completes those before it, as finish() does.
   void add(const Scan& scan, std::span<const std::uint32_t> raw_labels,
            const Eigen::Isometry3d& T_map_lidar);
 
@@ -29,6 +41,11 @@ class KittiSequenceWriter {
   void finish() const;
 
  private:
+  void write_files(const std::string& name, const Scan& scan,
+                   std::span<const std::uint32_t> raw_labels) const;
+  void remove_files(const std::string& name) const;
+  void finish_if_possible() const;
+
   std::filesystem::path folder_;
   Trajectory trajectory_;
 };

@@ -110,12 +110,14 @@ std::vector<std::size_t> lines_of(const std::vector<fs::path>& files) {
 /// Checks that a text file of a sequence reaches to all scans. A file that has exactly one line a
 /// scan belongs to them in order, whatever the names say.
 std::vector<std::size_t> lines_in(const fs::path& file, const std::vector<std::size_t>& by_name,
-                                  std::size_t present) {
-  if (*std::ranges::max_element(by_name) < present) return by_name;
+                                  std::size_t present, const std::vector<fs::path>& scans) {
+  const auto last = std::ranges::max_element(by_name);
+  if (*last < present) return by_name;
   if (present != by_name.size()) {
-    throw DatasetError(file, "has " + std::to_string(present) + " lines, fewer than the " +
-                                 std::to_string(by_name.size()) +
-                                 " scans need; take the file that belongs to this sequence");
+    const fs::path& scan = scans[static_cast<std::size_t>(last - by_name.begin())];
+    throw DatasetError(file, "has " + std::to_string(present) + " lines, but scan " +
+                                 scan.stem().string() + " needs line " + std::to_string(*last + 1) +
+                                 "; take the file that belongs to this sequence");
   }
   std::vector<std::size_t> in_order(present);
   for (std::size_t i = 0; i < present; ++i) in_order[i] = i;
@@ -175,7 +177,7 @@ ScanDataset::ScanDataset(const fs::path& path) : files_(scans_of(path)), lines_(
   const fs::path times = sequence_ / "times.txt";
   if (!sequence_.empty() && fs::exists(times)) {
     const auto times_ns = read_kitti_times_ns(times);
-    for (const std::size_t line : lines_in(times, lines_, times_ns.size())) {
+    for (const std::size_t line : lines_in(times, lines_, times_ns.size(), files_)) {
       stamps_ns_.push_back(times_ns[line]);
     }
   } else {
@@ -338,7 +340,7 @@ std::optional<Trajectory> ScanDataset::truth() const {
     T_map_lidar = lidar_poses_from_camera(T_map_lidar, read_kitti_calibration(calibration));
   }
   Trajectory trajectory;
-  const auto lines = lines_in(pose_file, lines_, T_map_lidar.size());
+  const auto lines = lines_in(pose_file, lines_, T_map_lidar.size(), files_);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     trajectory.push_back({stamp_ns(i), T_map_lidar[lines[i]]});
   }

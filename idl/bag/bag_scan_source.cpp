@@ -1,6 +1,7 @@
 #include "idl/bag/bag_scan_source.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "core/dataset/dataset_error.hpp"
@@ -125,13 +126,29 @@ DatasetFrame BagScanSource::read(std::size_t i) const {
   return frame;
 }
 
-std::vector<BagMessage> BagScanSource::only_messages_of(std::string_view type) const {
-  const auto is_such = [type](const BagTopic& topic) {
+std::vector<BagTopic> BagScanSource::topics_of(std::string_view type) const {
+  std::vector<BagTopic> found;
+  std::ranges::copy_if(bag_.topics(), std::back_inserter(found), [type](const BagTopic& topic) {
     return topic.messages > 0 && topic.type == type && topic.serialization_format == "cdr";
-  };
-  const std::vector<BagTopic>& topics = bag_.topics();
-  if (std::ranges::count_if(topics, is_such) != 1) return {};
-  return bag_.messages(std::ranges::find_if(topics, is_such)->name);
+  });
+  return found;
+}
+
+std::vector<BagMessage> BagScanSource::only_messages_of(std::string_view type) const {
+  const std::vector<BagTopic> topics = topics_of(type);
+  if (topics.size() != 1) return {};
+  return bag_.messages(topics.front().name);
+}
+
+std::vector<std::string> BagScanSource::faults() const {
+  std::vector<std::string> faults = bag_.faults();
+  for (const std::string_view type : {imu_message_type, gnss_message_type}) {
+    const std::vector<BagTopic> topics = topics_of(type);
+    if (topics.size() < 2) continue;
+    faults.push_back("the bag has several topics of " + std::string(type) +
+                     ", so none of them is used; leave one in it:" + listed(topics));
+  }
+  return faults;
 }
 
 std::vector<ImuSample> BagScanSource::imu() const {

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/dataset/scan_dataset.hpp"
@@ -30,13 +31,16 @@ class BagScanSource final : public ScanSource {
   [[nodiscard]] std::vector<ImuSample> imu() const override;
   /// Likewise of sensor_msgs/msg/NavSatFix.
   [[nodiscard]] std::vector<GnssFix> gnss() const override;
-  /// What of the bag's files cannot be read at all, in words; empty for a sound bag.
-  [[nodiscard]] std::vector<std::string> faults() const { return bag_.faults(); }
+  /// What of the bag's files cannot be read at all, and which topics are not used as there are
+  /// several of an IMU or a receiver, in words.
+  [[nodiscard]] std::vector<std::string> faults() const;
 
  private:
   /// A damaged message says nothing.
   [[nodiscard]] std::optional<SensorModel> sensor_of_first_readable() const;
   [[nodiscard]] DecodedScan read_message(std::size_t i) const;
+  /// Those of this type with messages.
+  [[nodiscard]] std::vector<BagTopic> topics_of(std::string_view type) const;
   /// Of the only topic of this type; none where there are several.
   [[nodiscard]] std::vector<BagMessage> only_messages_of(std::string_view type) const;
 
@@ -48,7 +52,7 @@ class BagScanSource final : public ScanSource {
   std::optional<SensorModel> sensor_;
 };
 
-/// A recording, and what of it cannot be read at all, in words.
+/// A recording, and what of it is not read, in words.
 struct Recording {
   ScanDataset dataset;
   std::vector<std::string> faults;

@@ -249,5 +249,50 @@ TEST_F(DatasetCommandTest, SensorFindsTheOffsetOfElevationsFromADrive) {
   EXPECT_THAT(refused.err, HasSubstr("20 scans or more, not of 5"));
 }
 
+TEST_F(DatasetCommandTest, ExportsTheSamplesOfImuAndGnss) {
+  simulate("city", 30, " --imu --gnss 1");
+  const nlohmann::json whole =
+      run_json("dataset export " + path("city") + " " + path("copy") + " --labels none");
+  EXPECT_TRUE(same("copy/imu.csv", "city/imu.csv"));
+  EXPECT_TRUE(same("copy/gnss.csv", "city/gnss.csv"));
+  EXPECT_EQ(whole.at("imu_samples"), line_count("city/imu.csv") - 1);
+  // Of a part: those of its time.
+  const ProcessResult part = run("dataset export " + path("city") + " " + path("part") +
+                                 " --labels none --start 25 --scans 2");
+  ASSERT_EQ(part.exit_code, 0) << part.err;
+  EXPECT_THAT(part.out, AllOf(HasSubstr("imu.csv"), HasSubstr("gnss.csv")));
+  EXPECT_LT(line_count("part/imu.csv"), line_count("city/imu.csv") - 200);
+  EXPECT_GT(line_count("part/imu.csv"), 200U);
+}
+
+TEST_F(DatasetCommandTest, ExportLeavesNoPartOfAnotherSequence) {
+  simulate("city", 2);
+  const std::string to_copy =
+      "dataset export " + path("city") + " " + path("copy") + " --labels none";
+  std::filesystem::create_directories(folder_ / "copy");
+  write("copy/poses_lidar.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  write("copy/imu.csv", "1,0,0,0,0,0,9.81\n");
+  const ProcessResult refused = run(to_copy);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("poses_lidar.txt"), HasSubstr("--force")));
+  EXPECT_FALSE(exists("copy/velodyne"));
+  const ProcessResult forced = run(to_copy + " --force");
+  ASSERT_EQ(forced.exit_code, 0) << forced.err;
+  EXPECT_FALSE(exists("copy/poses_lidar.txt"));
+  EXPECT_FALSE(exists("copy/imu.csv"));
+}
+
+TEST_F(DatasetCommandTest, SensorIsNotNamedFromScansWithoutPoints) {
+  write("nothing.pcd",
+        "VERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\n"
+        "WIDTH 2\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA ascii\n"
+        "nan nan nan 0.5\nnan nan nan 0.5\n");
+  const ProcessResult refused =
+      run("dataset sensor " + path("nothing.pcd") + " --out " + path("lidar.yaml"));
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("nothing.pcd"), HasSubstr("no scan with a finite")));
+  EXPECT_FALSE(exists("lidar.yaml"));
+}
+
 }  // namespace
 }  // namespace stillmap::test

@@ -112,5 +112,29 @@ TEST_F(HelpTest, LoadSaysWhenTheRunningMapIsNotSaved) {
   EXPECT_THAT(run("load --help").out, HasSubstr("what was saved there last"));
 }
 
+TEST_F(HelpTest, TopicNamesGoWithoutTheirFirstSlashAndTheRestIsRefused) {
+  for (const auto& [command, refused] :
+       {std::pair("record x --points a//b", "--points: 'a//b'"),
+        std::pair("record x --imu ''", "--imu: ''"),
+        std::pair("replay x --topic points/", "--topic: 'points/'"),
+        std::pair("replay x --gnss-topic //fix", "--gnss-topic: '//fix'"),
+        std::pair("doctor --points 'a b'", "--points: 'a b'"),
+        std::pair("security init x --imu 'imu data'", "--imu: 'imu data'"),
+        std::pair("security init x --server /bot/", "--server: '/bot/'"),
+        std::pair("status --server /bot/", "--server: '/bot/'"),
+        std::pair("dataset export topic:a//b x", "topic:a//b: 'a//b'")}) {
+    const ProcessResult result = run(command);
+    EXPECT_EQ(result.exit_code, 2) << command;
+    EXPECT_THAT(result.err, HasSubstr(std::string(refused) + " is no topic name")) << command;
+  }
+  const ProcessResult made =
+      run("security init " + path("keys") + " --points /front/points --imu '' --server /bot");
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const auto names = nlohmann::json::parse(content("keys/authority/topics.json"));
+  EXPECT_EQ(names.at("points"), "front/points");
+  EXPECT_EQ(names.at("imu"), "");
+  EXPECT_EQ(names.at("namespace"), "bot");
+}
+
 }  // namespace
 }  // namespace stillmap::test

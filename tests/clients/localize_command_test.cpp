@@ -1,4 +1,5 @@
 #include <cmath>
+#include <filesystem>
 #include <sstream>
 #include <vector>
 
@@ -80,6 +81,18 @@ TEST_F(LocalizeCommandTest, NamesWhatItCannotUse) {
   EXPECT_EQ(no_scans.exit_code, 2);
   EXPECT_THAT(no_scans.err, HasSubstr("nowhere"));
   EXPECT_EQ(localize("city", "--start 1000").exit_code, 2);
+}
+
+TEST_F(LocalizeCommandTest, CountsScansThatItCannotRead) {
+  for (const char* scan : {"000030", "000031"})
+    std::filesystem::resize_file(path("city/velodyne/" + std::string(scan) + ".bin"), 10);
+  const ProcessResult none = localize("city", "--start 30 --scans 2 --json");
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.err, HasSubstr("no scan of"));
+  const nlohmann::json report = nlohmann::json::parse(none.out);
+  EXPECT_EQ(report.at("skipped"), 2);
+  EXPECT_EQ(report.at("scans").size(), 0U);
+  EXPECT_THAT(localize("city", "--start 29 --scans 3").out, HasSubstr("2 damaged ones skipped"));
 }
 
 }  // namespace

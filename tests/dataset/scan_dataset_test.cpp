@@ -207,7 +207,7 @@ TEST(ScanDataset, ACutOutOfASequenceKeepsItsTimesAndPoses) {
   EXPECT_EQ(ScanDataset(folder.path()).stamp_ns(1), 80);
   write_kitti_times_ns(folder.path() / "times.txt", std::vector<std::int64_t>{70});
   EXPECT_THAT(message_of<DatasetError>([&] { ScanDataset{folder.path()}; }),
-              AllOf(HasSubstr("times.txt"), HasSubstr("1 lines"), HasSubstr("2 scans")));
+              AllOf(HasSubstr("times.txt"), HasSubstr("1 lines"), HasSubstr("scan 000003 needs line 4")));
 }
 
 TEST(ScanDataset, OneDamagedScanLeavesTheOthersReadable) {
@@ -323,6 +323,32 @@ TEST(ScanDataset, LabelsOfAnotherScanAreRefused) {
               AllOf(HasSubstr("rings"), HasSubstr("1 values"), HasSubstr("2 points")));
   std::filesystem::remove_all(folder.path() / "rings");
   EXPECT_THROW((void)ScanDataset(folder.path()).read(1), DatasetError);
+}
+
+TEST(KittiSequenceWriter, AScanThatCannotBeWrittenLeavesThoseBeforeItComplete) {
+  const ScratchFolder folder;
+  KittiSequenceWriter writer(folder.path());
+  for (int k = 0; k < 2; ++k)
+    writer.add(small_scan(2, k), std::vector<std::uint32_t>(2), pose_at(k, 0));
+  std::filesystem::create_directories(folder.path() / "labels/000002.label");
+  EXPECT_THROW(writer.add(small_scan(2, 2), std::vector<std::uint32_t>(2), pose_at(2, 0)),
+               DatasetWriteError);
+  const ScanDataset dataset(folder.path());
+  ASSERT_EQ(dataset.size(), 2U);
+  ASSERT_TRUE(dataset.truth().has_value());
+  EXPECT_EQ(dataset.truth()->back().stamp_ns, 1);
+}
+
+TEST(ScanDataset, NamesTheScanAndTheLineThatATextFileLacks) {
+  const ScratchFolder folder;
+  for (const char* scan : {"velodyne/000026.bin", "velodyne/000027.bin", "velodyne/000028.bin"})
+    write_kitti_bin(folder.file(scan, ""), small_scan(2, 0));
+  std::string times;
+  for (int line = 0; line < 12; ++line) times += "0." + std::to_string(10 + line) + "\n";
+  (void)folder.file("times.txt", times);
+  EXPECT_THAT(
+      message_of<DatasetError>([&] { ScanDataset{folder.path()}; }),
+      AllOf(HasSubstr("times.txt"), HasSubstr("12 lines"), HasSubstr("scan 000028 needs line 29")));
 }
 
 }  // namespace

@@ -418,5 +418,25 @@ TEST(BagScanSource, SaysThatATopicsMessagesCannotBeFound) {
             std::string::npos);
 }
 
+TEST(BagScanSource, NamesTheImusAndReceiversOfWhichItUsesNone) {
+  const ScratchFolder folder;
+  BagTopic front = cloud_topic("/front/imu"), rear = cloud_topic("/rear/imu");
+  front.type = rear.type = "sensor_msgs/msg/Imu";
+  BagTopic fix = cloud_topic("/fix");
+  fix.type = "sensor_msgs/msg/NavSatFix";
+  {
+    BagWriter writer(folder / "bag", {cloud_topic("/points"), front, rear, fix});
+    writer.add(0, 1, bag_message(0));
+    for (const std::size_t imu : {1U, 2U}) writer.add(imu, 2, serialized(wire::to_imu({}, "imu")));
+    writer.add(3, 3, Bytes{0, 1, 0, 0});
+    writer.finish();
+  }
+  const Recording recording = open_recording(folder / "bag");
+  EXPECT_TRUE(recording.dataset.imu().empty());
+  ASSERT_EQ(recording.faults.size(), 1U) << "of one receiver there is nothing to say";
+  EXPECT_THAT(recording.faults.front(), AllOf(HasSubstr("sensor_msgs/msg/Imu"),
+                                              HasSubstr("/front/imu"), HasSubstr("/rear/imu")));
+}
+
 }  // namespace
 }  // namespace stillmap::dds

@@ -64,6 +64,27 @@ def test_scans_are_made_of_arrays():
         stillmap.Scan(points, labels=np.full(10, 20))
 
 
+def test_whole_numbers_are_never_bent_to_fit():
+    points = np.zeros((10, 3))
+    for wrong in (266, -1, 0x1000A):
+        with pytest.raises(ValueError, match=f"labels has the class {wrong};"):
+            stillmap.Scan(points, labels=np.full(10, wrong))
+    with pytest.raises(ValueError, match="labels has the number 18446744073709551615"):
+        stillmap.Scan(points, labels=np.full(10, 2**64 - 1, np.uint64))
+    with pytest.raises(ValueError, match="labels has the type float64"):
+        stillmap.Scan(points, labels=np.full(10, np.nan))
+    for wrong in (70000, -1):
+        with pytest.raises(ValueError, match=f"ring has the number {wrong}; .* 0 to 65535"):
+            stillmap.Scan(points, ring=np.full(10, wrong))
+    with pytest.raises(ValueError, match="ring has the type"):
+        stillmap.Scan(points, ring=["a"] * 10)
+    with pytest.raises(ValueError, match="stamp_ns has the type float64"):
+        stillmap.Trajectory([1.7e18 + 123, np.nan], np.tile(np.eye(4), (2, 1, 1)))
+    assert stillmap.Scan(points, ring=[65535] * 10).ring.max() == 65535
+    assert len(stillmap.Scan(np.zeros((0, 3)), ring=[], labels=[])) == 0
+    assert len(stillmap.Trajectory([2**62, 2**62 + 1], np.tile(np.eye(4), (2, 1, 1)))) == 2
+
+
 def test_faults_name_the_file(tmp_path):
     with pytest.raises(stillmap.DatasetError, match="missing"):
         stillmap.open_dataset(tmp_path / "missing")

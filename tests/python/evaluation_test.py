@@ -61,6 +61,8 @@ def test_a_map_of_the_fixed_points_is_perfectly_clean():
     points[ids == 252, 0] += 30
     score = stillmap.map_cleaning_score(points, ids, points[ids == 50])
     assert score["preservation_rate"] == 1.0 and score["rejection_rate"] == 1.0
+    with_instances = ids.astype(np.uint32) | np.uint32(40000 << 16)
+    assert stillmap.map_cleaning_score(points, with_instances, points[ids == 50]) == score
     worst = stillmap.map_cleaning_score(points, ids, points)
     assert worst["rejection_rate"] == 0.0 and worst["f1"] == 0.0
 
@@ -74,3 +76,9 @@ def test_wrong_shapes_are_refused():
         stillmap.absolute_trajectory_error(np.zeros((5, 3)), np.zeros((5, 3)))
     with pytest.raises(ValueError, match="class 20"):
         stillmap.ConfusionMatrix().add([20], [1])
+    with pytest.raises(ValueError, match="truth has the class 257"):
+        stillmap.ConfusionMatrix().add([257], [1])
+    with pytest.raises(ValueError, match="predicted has the type float64"):
+        stillmap.ConfusionMatrix().add([1], [1.5])
+    with pytest.raises(ValueError, match="truth_ids has the number -1"):
+        stillmap.map_cleaning_score(np.zeros((1, 3)), [-1], np.zeros((1, 3)))

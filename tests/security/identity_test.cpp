@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
 
 #include "idl/dds/security/authority.hpp"
 #include "idl/dds/security/documents.hpp"
@@ -130,6 +133,55 @@ TEST_F(IdentityTest, IsMadeOnceAndReplacedOnDemand) {
   }
   EXPECT_THROW((void)Authority::make(scratch_ / "keys", 5), SecurityError);
   EXPECT_THROW((void)Authority::open(scratch_ / "nowhere"), SecurityError);
+}
+
+/// No file takes a byte more, as on a full disk.
+class FullDisk {
+ public:
+  FullDisk() : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit none{0, before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &none);
+  }
+  ~FullDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int);
+};
+
+TEST_F(IdentityTest, StaysAsItIsWhenItsSuccessorCannotBeWritten) {
+  const std::string before = content_of(folder_ / "key.pem");
+  std::string told;
+  try {
+    const FullDisk full;
+    (void)authority_.add("front_lidar", "sensor", access_, Validity::days_from_now(5), true);
+  } catch (const SecurityError& error) {
+    told = error.what();
+  }
+  EXPECT_THAT(told, AllOf(HasSubstr("key.pem"), HasSubstr("cannot be written")));
+  EXPECT_EQ(content_of(folder_ / "key.pem"), before);
+  EXPECT_THAT(check().faults, IsEmpty());
+  EXPECT_THAT(check().warnings, IsEmpty());
+  EXPECT_THAT(authority_.identities(), ElementsAre(folder_));
+}
+
+TEST_F(IdentityTest, OfAnAuthorityThatCouldNotBeWrittenLeavesRoomForAnother) {
+  bool is_refused = false;
+  try {
+    const FullDisk full;
+    (void)Authority::make(scratch_ / "late", 5);
+  } catch (const SecurityError&) {
+    is_refused = true;
+  }
+  EXPECT_TRUE(is_refused);
+  EXPECT_TRUE(fs::is_empty(scratch_ / "late"));
+  EXPECT_NO_THROW((void)Authority::make(scratch_ / "late", 5));
 }
 
 }  // namespace

@@ -215,5 +215,29 @@ TEST_F(SecuredDomain, DoesNotStartWithAnIdentityThatExpired) {
   EXPECT_THAT(renewed.out, HasSubstr("a server, valid until"));
 }
 
+TEST_F(SecuredDomain, ChecksTheOthersBesideACertificateThatCannotBeRead) {
+  std::ofstream(identity("planner") / "cert.pem", std::ios::trunc) << "nonsense\n";
+  const ProcessResult checked =
+      run_stillmap("security check " + (folder_ / "keys").string(), folder_.path());
+  EXPECT_EQ(checked.exit_code, 1) << checked.err;
+  EXPECT_THAT(checked.out, AllOf(HasSubstr("planner/cert.pem is no certificate"),
+                                 HasSubstr("operator: ok"), HasSubstr("server: ok")));
+}
+
+TEST_F(SecuredDomain, IsMadeWholeOrNotAtAll) {
+  const std::filesystem::path keys = folder_ / "halves";
+  std::filesystem::create_directories(keys / "planner");
+  const std::string init = "security init " + keys.string();
+  const ProcessResult refused = run_stillmap(init, folder_.path());
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("halves/planner exists"));
+  EXPECT_FALSE(std::filesystem::exists(keys / "authority"));
+  EXPECT_FALSE(std::filesystem::exists(keys / "server"));
+  EXPECT_TRUE(std::filesystem::exists(keys / "planner"));
+  std::filesystem::remove(keys / "planner");
+  const ProcessResult made = run_stillmap(init, folder_.path());
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+}
+
 }  // namespace
 }  // namespace stillmap::test

@@ -1,5 +1,7 @@
 #include "clients/commands/arguments/client_arguments.hpp"
 
+#include "config/loaders/topic_name.hpp"
+
 namespace stillmap::cli {
 
 std::chrono::milliseconds ClientArguments::timeout() const {
@@ -49,6 +51,7 @@ void add_client_options(CommandHandle command, ClientArguments& arguments) {
       .with_default();
   add_network_options(command, arguments.network);
   command.option("--server", arguments.server_name, "First part of the server's topic names")
+      .corrected(to_topic_name)
       .with_default();
   command.flag(
       "--udp-only", arguments.udp_only,

@@ -1,6 +1,7 @@
 #include <iostream>
 #include <memory>
 #include <stdexcept>
+#include <utility>
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/arguments/mapper_arguments.hpp"
@@ -10,6 +11,7 @@
 #include "clients/commands/dataset/sequence_export.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
+#include "config/loaders/topic_name.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -38,6 +40,8 @@ Json to_json(const DatasetExportArguments& arguments, const ExportSummary& summa
           {"points", summary.points},
           {"labelled_points", summary.labelled_points},
           {"label_source", summary.label_source},
+          {"imu_samples", summary.imu_samples},
+          {"gnss_fixes", summary.gnss_fixes},
           {"poses_frame", "camera of calib.txt: scan k into scan 0; its lidar frame is Tr^-1 T Tr"},
           {"remarks", remarks},
           {"interrupted", summary.stopped}};
@@ -49,6 +53,10 @@ std::string describe(const DatasetExportArguments& arguments, const ExportSummar
                      " with a label from '" + summary.label_source + "'): " + arguments.out +
                      "/ (SemanticKITTI sequence; poses.txt is in the camera frame of calib.txt, as "
                      "KITTI's)\n";
+  if (summary.imu_samples > 0)
+    text += std::to_string(summary.imu_samples) + " samples of an IMU: imu.csv\n";
+  if (summary.gnss_fixes > 0)
+    text += std::to_string(summary.gnss_fixes) + " fixes of a GNSS receiver: gnss.csv\n";
   for (const auto& [scans, remark] : summary.remarks) {
     text.append(std::to_string(scans)).append(" ").append(remark).append("\n");
   }
@@ -65,6 +73,9 @@ ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopS
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
   auto labels = make_segmenter(arguments.mapper, dataset);
   std::cerr << describe_model(arguments.mapper, dataset, *labels);
+  // What cannot be read is told before anything is replaced.
+  static_cast<void>(dataset.imu());
+  static_cast<void>(dataset.gnss());
   prepare_sequence_folder(arguments.out, arguments.force, arguments.source);
   Progress progress("export", "scans", total);
   return export_sequence(
@@ -77,6 +88,10 @@ ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopS
 }
 
 ExportSummary export_from_topic(const DatasetExportArguments& arguments, StopSignal& stop) {
+  std::string topic = arguments.source.substr(topic_prefix.size());
+  if (const std::string fault = to_topic_name(topic); !fault.empty()) {
+    throw std::invalid_argument("SOURCE " + arguments.source + ": " + fault);
+  }
   ServerConfig config;
   if (!arguments.mapper.config_file.empty()) {
     config = load_server_config(arguments.mapper.config_file);
@@ -85,7 +100,7 @@ ExportSummary export_from_topic(const DatasetExportArguments& arguments, StopSig
   Client client = connect(arguments.client);
   prepare_sequence_folder(arguments.out, arguments.force);
   const LiveExportOptions options{
-      .topic = arguments.source.substr(topic_prefix.size()),
+      .topic = std::move(topic),
       .scans = arguments.range.count,
       .idle_timeout =
           std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * arguments.idle_timeout_s))};
@@ -150,7 +165,8 @@ void add_dataset_export_command(CommandHandle dataset, Action& action) {
       "server, or 0), times.txt, calib.txt, and poses.txt from our odometry: camera frame of scan\n"
       "k into camera frame of scan 0, where calib.txt's Tr takes lidar to camera (a camera that\n"
       "looks forward from the lidar's place). Point times and rings go to time_offsets/ and "
-      "rings/.\n"
+      "rings/, an IMU's samples and a GNSS receiver's fixes to imu.csv and gnss.csv (not of a live "
+      "topic).\n"
       "Ctrl-C leaves a shorter sequence that is complete in itself; a new run starts over, as "
       "poses\n"
       "follow from all scans before. Live, give the server's own file with --config.");

@@ -10,6 +10,7 @@
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/table.hpp"
 #include "config/loaders/sensor_file.hpp"
+#include "core/dataset/dataset_error.hpp"
 #include "core/elevation_calibration.hpp"
 #include "core/lidar/sensor_fit.hpp"
 
@@ -66,8 +67,29 @@ void calibrate(const ScanDataset& recording, int max_scans, SensorModel& sensor)
             << fixed(100.0 * found.saving, 2) << " % of the voxels\n";
 }
 
+/// Whether the scan can be read and has a point that is anywhere.
+bool has_points(const ScanDataset& recording, std::size_t index) {
+  try {
+    return std::ranges::any_of(recording.read(index).scan.points_lidar,
+                               [](const Eigen::Vector3f& point) { return point.allFinite(); });
+  } catch (const DatasetError&) {
+    return false;
+  }
+}
+
+/// A sensor of which nothing is seen would be named all the same.
+void require_points(const ScanDataset& recording, const std::string& path) {
+  for (std::size_t i = 0; i < recording.size(); ++i) {
+    if (has_points(recording, i)) return;
+  }
+  throw DatasetError(path,
+                     "has no scan with a finite point, and so shows no sensor; give a recording "
+                     "with points");
+}
+
 ExitCode run(const DatasetSensorArguments& arguments) {
   const ScanDataset recording = open_recording(arguments.dataset, arguments.topic);
+  require_points(recording, arguments.dataset);
   SensorModel sensor = recording.suggested_sensor();
   std::cout << in_words(sensor) << "\n";
   if (arguments.calibrates) calibrate(recording, arguments.scans, sensor);

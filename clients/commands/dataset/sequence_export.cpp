@@ -1,15 +1,28 @@
 #include "clients/commands/dataset/sequence_export.hpp"
 
 #include <algorithm>
-#include <array>
 #include <stdexcept>
 #include <utility>
 
 #include "clients/commands/mapping/scans_ahead.hpp"
 #include "core/dataset/dataset_error.hpp"
+#include "core/dataset/gnss_file.hpp"
+#include "core/dataset/imu_file.hpp"
 
 namespace stillmap::cli {
 namespace {
+
+/// Those from a second before the first scan to a second after the last one: where the lidar was
+/// before it, and through the last sweep.
+template <class Sample>
+std::vector<Sample> samples_around(std::vector<Sample> samples, std::int64_t first_ns,
+                                   std::int64_t last_ns) {
+  constexpr std::int64_t margin_ns = 1'000'000'000;
+  std::erase_if(samples, [=](const Sample& sample) {
+    return sample.stamp_ns < first_ns - margin_ns || sample.stamp_ns > last_ns + margin_ns;
+  });
+  return samples;
+}
 
 class SequenceExporter {
  public:
@@ -22,10 +35,23 @@ class SequenceExporter {
         prepare_(config.prepare),
         scans_(dataset, config, std::move(labels)),
         mapper_(config, scans_.segmenter()),
+        folder_(folder),
         output_(folder) {}
 
   /// Before the first scan: which ones export_scan() will get, in their order.
   void expect(std::size_t first, std::size_t end) { scans_.start(first, end); }
+
+  /// What was recorded beside these scans. Before them, so that it is there however the run ends.
+  void export_samples(std::size_t first, std::size_t end) {
+    if (first >= end) return;
+    const std::int64_t first_ns = dataset_.stamp_ns(first), last_ns = dataset_.stamp_ns(end - 1);
+    const auto imu = samples_around(dataset_.imu(), first_ns, last_ns);
+    const auto gnss = samples_around(dataset_.gnss(), first_ns, last_ns);
+    if (!imu.empty()) write_imu_csv(folder_ / "imu.csv", imu);
+    if (!gnss.empty()) write_gnss_csv(folder_ / "gnss.csv", gnss);
+    imu_samples_ = imu.size();
+    gnss_fixes_ = gnss.size();
+  }
 
   void export_scan(std::size_t index) {
     const std::optional<DatasetFrame> frame = read(index);
@@ -53,6 +79,8 @@ class SequenceExporter {
     ExportSummary summary = output_.finish();
     summary.label_source = mapper_.label_source();
     summary.stopped = stopped;
+    summary.imu_samples = imu_samples_;
+    summary.gnss_fixes = gnss_fixes_;
     if (damaged_ > 0) summary.remarks.push_back({damaged_, "damaged files skipped"});
     if (without_pose_ > 0) {
       summary.remarks.push_back({without_pose_, "scans with the pose of the scan before them"});
@@ -78,7 +106,10 @@ class SequenceExporter {
   PrepareConfig prepare_;
   ScansAhead scans_;
   Mapper mapper_;
+  std::filesystem::path folder_;
   SequenceOutput output_;
+  std::size_t imu_samples_ = 0;
+  std::size_t gnss_fixes_ = 0;
   Eigen::Isometry3d T_map_lidar_ = Eigen::Isometry3d::Identity();
   std::size_t damaged_ = 0;
   std::size_t without_pose_ = 0;
@@ -96,23 +127,21 @@ bool is_within(const std::filesystem::path& path, const std::filesystem::path& f
 
 void prepare_sequence_folder(const std::filesystem::path& folder, bool force,
                              const std::filesystem::path& source) {
-  constexpr std::array parts{"velodyne",        "labels",    "labels.bak", "rings",
-                             "time_offsets",    "calib.txt", "times.txt",  "poses.txt",
-                             "poses_lidar.txt", "imu.csv",   "imu.txt",    "gnss.csv"};
-  if (!std::filesystem::exists(folder / parts.front())) return;
+  const std::filesystem::path present = part_of_sequence_in(folder);
+  if (present.empty()) return;
   if (!force) {
-    throw std::invalid_argument(folder.string() +
-                                " holds a sequence already; name another folder, or replace it "
-                                "and its labels with --force");
+    throw std::invalid_argument(
+        folder.string() + " holds a sequence already (" + present.string() +
+        "); name another folder, or replace it and its labels with --force");
   }
-  for (const char* part : parts) {
+  for (const char* part : sequence_parts) {
     if (is_within(source, folder / part)) {
       throw std::invalid_argument(source.string() + " is a part of " + folder.string() +
                                   ", which would be replaced: the source stays as it is; name "
                                   "another folder");
     }
   }
-  for (const char* part : parts) std::filesystem::remove_all(folder / part);
+  for (const char* part : sequence_parts) std::filesystem::remove_all(folder / part);
 }
 
 std::vector<std::uint32_t> labels_of_all_points(const Scan& scan,
@@ -148,6 +177,7 @@ ExportSummary export_sequence(const ScanDataset& dataset, const ScanRange& range
                               const ScanSkipped& scan_skipped) {
   const std::size_t end = range.end(dataset);
   SequenceExporter run(dataset, range.strict, config, std::move(labels), folder, scan_skipped);
+  run.export_samples(range.first, end);
   run.expect(range.first, end);
   bool keep_running = true;
   for (std::size_t index = range.first; index < end && keep_running; ++index) {

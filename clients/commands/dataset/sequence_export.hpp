@@ -14,9 +14,9 @@
 
 namespace stillmap::cli {
 
-/// Prepares the folder for a new sequence. Throws std::invalid_argument when `folder` holds one
-/// already and `force` is not set; with `force`, removes the files of that sequence and nothing
-/// else, and throws as well where the `source` of the new one is among them.
+/// Prepares the folder for a new sequence. Throws std::invalid_argument when `folder` holds a
+/// part of one already and `force` is not set; with `force`, removes the files of that sequence and
+/// nothing else, and throws as well where the `source` of the new one is among them.
 void prepare_sequence_folder(const std::filesystem::path& folder, bool force,
                              const std::filesystem::path& source = {});
 
@@ -27,6 +27,8 @@ struct ExportSummary {
   /// Points that have a label from the data set or the label source.
   std::uint64_t labelled_points = 0;
   std::string label_source;
+  std::size_t imu_samples = 0;
+  std::size_t gnss_fixes = 0;
   /// A fault of some scans, and their number.
   struct Remark {
     std::size_t scans = 0;
@@ -61,8 +63,8 @@ class SequenceOutput {
 };
 
 /// Writes a data set as a SemanticKITTI sequence: every point of every scan unchanged, poses from
-/// our odometry, and for labels the data set's own where a scan has them, else those of
-/// `labels`. `scan_done` as for map_dataset. Throws DatasetError.
+/// our odometry, the samples of its IMU and GNSS receiver, and for labels the data set's own where
+/// a scan has them, else those of `labels`. `scan_done` as for map_dataset. Throws DatasetError.
 [[nodiscard]] ExportSummary export_sequence(const ScanDataset& dataset, const ScanRange& range,
                                             const MapperConfig& config,
                                             std::unique_ptr<Segmenter> labels,

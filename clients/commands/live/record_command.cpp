@@ -16,6 +16,7 @@
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
+#include "config/loaders/topic_name.hpp"
 #include "idl/bag/bag_writer.hpp"
 #include "idl/dds/dds_options.hpp"
 #include "idl/dds/message_definition.hpp"
@@ -356,15 +357,22 @@ void add_record_command(CommandHandle program, Action& action) {
                  "ROS 2 names of the topics to record; default: all of the sensor and the server");
   command.option("--for", arguments->seconds, "Stop after so many seconds; default: at Ctrl-C")
       .above_zero();
-  command.option("--points", arguments->recorder.points_topic, "The sensor's topic").with_default();
-  command.option("--odometry", arguments->recorder.odometry_topic, "The odometry prior's topic")
+  command.option("--points", arguments->recorder.points_topic, "The sensor's topic")
+      .corrected(to_topic_name)
       .with_default();
-  command.option("--imu", arguments->recorder.imu_topic, "The IMU's topic").with_default();
+  command.option("--odometry", arguments->recorder.odometry_topic, "The odometry prior's topic")
+      .corrected(to_topic_name)
+      .with_default();
+  command.option("--imu", arguments->recorder.imu_topic, "The IMU's topic")
+      .corrected(to_topic_name)
+      .with_default();
   command.option("--gnss", arguments->recorder.gnss_topic, "A GNSS receiver's topic")
+      .corrected(to_topic_name)
       .with_default();
   command
       .option("--initial-pose", arguments->recorder.initial_pose_topic,
               "The topic on which operators say where the robot is")
+      .corrected(to_topic_name)
       .with_default();
   add_client_options(command, arguments->client);
   command.flag("--json", arguments->json, "Print JSON");

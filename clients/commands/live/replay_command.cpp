@@ -30,6 +30,7 @@
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
+#include "config/loaders/topic_name.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/scan_dataset.hpp"
 
@@ -462,14 +463,18 @@ void add_replay_command(CommandHandle program, Action& action) {
   command.flag("--labels,!--no-labels", replay.with_labels,
                "Send the labels of the sequence, where it has any (default)");
   command.flag("--strict", replay.range.strict, "Stop at the first damaged file");
-  command.option("--topic", arguments->topic, "ROS 2 name of the topic").with_default();
+  command.option("--topic", arguments->topic, "ROS 2 name of the topic")
+      .corrected(to_topic_name)
+      .with_default();
   command
       .option("--imu-topic", arguments->imu_topic,
               "ROS 2 name of the topic for the samples of an IMU, where the sequence has any")
+      .corrected(to_topic_name_or_empty)
       .with_default();
   command
       .option("--gnss-topic", arguments->gnss_topic,
               "The same for the fixes of a GNSS receiver; the server's topics.gnss")
+      .corrected(to_topic_name_or_empty)
       .with_default();
   command
       .option("--subscribers", arguments->subscribers,
@@ -485,8 +490,7 @@ void add_replay_command(CommandHandle program, Action& action) {
       "Examples:\n"
       "  stillmap replay sequences/00 --rate 2\n"
       "  stillmap replay city --lossless --out poses_lidar.txt\n"
-      "  stillmap replay city --mount 1.2,0,1.4,0,15,0   # for a server with mount: {source: "
-      "tf_static}\n"
+      "  stillmap replay city --mount 1.2,0,1.4,0,15,0   # for mount: {source: tf_static}\n"
       "Of a pause in the recording, 10 s are waited at most.\n"
       "Ends when the server has processed what was sent, and prints the counts. Exit code 1\n"
       "when a lossless replay lost something, 3 when no server answers or it stops taking scans.");

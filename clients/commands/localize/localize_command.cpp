@@ -108,10 +108,14 @@ class LocalizationRun {
       return localized;
     } catch (const DatasetError& error) {
       if (is_strict_) throw;
+      ++skipped_;
       progress.say(std::string("stillmap: skipped: ") + error.what());
       return std::nullopt;
     }
   }
+
+  /// Scans that could not be read.
+  [[nodiscard]] std::size_t skipped() const { return skipped_; }
 
  private:
   const ScanDataset& dataset_;
@@ -120,6 +124,7 @@ class LocalizationRun {
   std::unique_ptr<Segmenter> segmenter_;
   Eigen::Isometry3d T_body_lidar_;
   bool is_strict_;
+  std::size_t skipped_ = 0;
 };
 
 Json place_json(const Eigen::Isometry3d& T) {
@@ -153,7 +158,16 @@ Json to_json(const LocalizedScan& scan) {
   return json;
 }
 
-Json to_json(const std::vector<LocalizedScan>& scans, const SearchableMap& map, double median_ms) {
+double median_ms(const std::vector<LocalizedScan>& scans) {
+  std::vector<double> times;
+  for (const LocalizedScan& scan : scans) times.push_back(scan.ms);
+  const auto middle = times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2);
+  std::nth_element(times.begin(), middle, times.end());
+  return times.empty() ? 0.0 : *middle;
+}
+
+Json to_json(const std::vector<LocalizedScan>& scans, std::size_t skipped,
+             const SearchableMap& map) {
   Json list = Json::array();
   std::size_t found = 0;
   for (const LocalizedScan& scan : scans) {
@@ -168,18 +182,12 @@ Json to_json(const std::vector<LocalizedScan>& scans, const SearchableMap& map, 
             {"index_bytes", map.index->memory_bytes()}}},
           {"scans", list},
           {"found", found},
-          {"median_ms", median_ms}};
+          {"skipped", skipped},
+          {"median_ms", median_ms(scans)}};
 }
 
-double median_ms(const std::vector<LocalizedScan>& scans) {
-  std::vector<double> times;
-  for (const LocalizedScan& scan : scans) times.push_back(scan.ms);
-  const auto middle = times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2);
-  std::nth_element(times.begin(), middle, times.end());
-  return times.empty() ? 0.0 : *middle;
-}
-
-std::string describe(const std::vector<LocalizedScan>& scans, const SearchableMap& map) {
+std::string describe(const std::vector<LocalizedScan>& scans, std::size_t skipped,
+                     const SearchableMap& map) {
   Table table({"scan", "", "x", "y", "z", "heading", "score", "runner-up", "ms"});
   std::size_t found = 0;
   for (const LocalizedScan& scan : scans) {
@@ -197,8 +205,9 @@ std::string describe(const std::vector<LocalizedScan>& scans, const SearchableMa
     table.add(row);
   }
   return table.text() + std::to_string(found) + " of " + std::to_string(scans.size()) +
-         " scans found, " + fixed(median_ms(scans), 0) + " ms a scan (median); map read in " +
-         fixed(map.load_ms, 0) + " ms, made searchable in " + fixed(map.index_ms, 0) + " ms\n";
+         " scans found, " + std::to_string(skipped) + " damaged ones skipped, " +
+         fixed(median_ms(scans), 0) + " ms a scan (median); map read in " + fixed(map.load_ms, 0) +
+         " ms, made searchable in " + fixed(map.index_ms, 0) + " ms\n";
 }
 
 /// The map with the poses that were found.
@@ -227,8 +236,12 @@ ExitCode run(const LocalizeArguments& arguments) {
     progress.update((index - arguments.range.first) / step + 1);
   }
   if (!arguments.picture.empty()) write_picture(arguments.picture, scans, map);
-  std::cout << (arguments.json ? to_json(scans, map, median_ms(scans)).dump(2) + "\n"
-                               : describe(scans, map));
+  std::cout << (arguments.json ? to_json(scans, run.skipped(), map).dump(2) + "\n"
+                               : describe(scans, run.skipped(), map));
+  if (scans.empty() && !stop.requested()) {
+    std::cerr << "stillmap: no scan of " << arguments.dataset << " could be looked for\n";
+    return ExitCode::bad_input;
+  }
   return stop.requested() ? ExitCode::failed : ExitCode::ok;
 }
 

@@ -9,6 +9,7 @@
 #include "clients/doctor/collect_snapshot.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
+#include "config/loaders/topic_name.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -180,6 +181,7 @@ void add_doctor_command(CommandHandle program, Action& action) {
   command
       .option("--points", arguments->points,
               "The sensor's topic, where no server tells it by itself")
+      .corrected(to_topic_name)
       .with_default();
   command.option("--listen", arguments->listening_s, "How long to listen to the network [s]")
       .above_zero_to(3600)

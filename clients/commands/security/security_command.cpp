@@ -6,9 +6,12 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <system_error>
+#include <vector>
 
 #include "clients/commands/command.hpp"
 #include "clients/terminal/json.hpp"
+#include "config/loaders/topic_name.hpp"
 #include "idl/dds/dds_error.hpp"
 #include "idl/dds/security/authority.hpp"
 #include "idl/dds/security/identity.hpp"
@@ -63,19 +66,42 @@ struct InitArguments {
   int authority_days = 3650;
 };
 
+/// Folders that go again unless all that belongs together could be made.
+class UnfinishedFolders {
+ public:
+  UnfinishedFolders() = default;
+  ~UnfinishedFolders() {
+    std::error_code ignored;
+    for (const auto& folder : folders_) std::filesystem::remove_all(folder, ignored);
+  }
+  UnfinishedFolders(const UnfinishedFolders&) = delete;
+  UnfinishedFolders& operator=(const UnfinishedFolders&) = delete;
+
+  void add(const std::filesystem::path& folder) { folders_.push_back(folder); }
+  void keep() { folders_.clear(); }
+
+ private:
+  std::vector<std::filesystem::path> folders_;
+};
+
 ExitCode run(const InitArguments& arguments) {
+  UnfinishedFolders unfinished;
+  if (!std::filesystem::exists(arguments.folder)) unfinished.add(arguments.folder);
   const dds::Authority authority = dds::Authority::make(arguments.folder, arguments.authority_days);
+  unfinished.add(authority.key_file().parent_path());
   save_topic_names(arguments.names, arguments.folder);
   const dds::Validity validity = dds::Validity::days_from_now(arguments.days);
+  std::string made;
   for (const dds::Role role :
        {dds::Role::server, dds::Role::sensor, dds::Role::planner, dds::Role::operator_of_server}) {
     const std::string role_name(name(role));
-    std::cout << authority
-                     .add(role_name, role_name, dds::access_of(role, arguments.names), validity)
-                     .string()
-              << "\n";
+    const std::filesystem::path identity =
+        authority.add(role_name, role_name, dds::access_of(role, arguments.names), validity);
+    unfinished.add(identity);
+    made += identity.string() + "\n";
   }
-  std::cout << "Each folder is one identity, valid until " << dds::to_text(validity.to)
+  unfinished.keep();
+  std::cout << made << "Each folder is one identity, valid until " << dds::to_text(validity.to)
             << ": copy it to where it is used, as\n  stillmap-server --security "
             << arguments.folder << "/server\n  stillmap status --security " << arguments.folder
             << "/planner\nKeep " << authority.key_file().string()
@@ -152,9 +178,12 @@ bool is_key_hidden(const dds::Authority& authority) {
   return is_hidden;
 }
 
+/// Also for a certificate that cannot be read, which is_fault_free() tells of.
 bool is_of_authority(const fs::path& identity, const dds::Authority& authority) {
   const fs::path file = dds::IdentityFiles(identity).certificate;
-  if (!fs::exists(file) || dds::Certificate::read(file).is_signed_by(authority.certificate())) {
+  try {
+    if (dds::Certificate::read(file).is_signed_by(authority.certificate())) return true;
+  } catch (const dds::SecurityError&) {
     return true;
   }
   std::cout << "FAULT   " << file.string() << " was not issued by the authority of this folder\n";
@@ -182,19 +211,27 @@ void add_security_init_command(CommandHandle security, Action& action) {
   CommandHandle command = security.command(
       "init", "Make an authority, and identities for server, sensor, planner and operator");
   command.option("FOLDER", arguments->folder, "Where to; must not have an authority").required();
-  command.option("--points", arguments->names.points, "The sensor's topic").with_default();
+  command.option("--points", arguments->names.points, "The sensor's topic")
+      .corrected(to_topic_name)
+      .with_default();
   command
       .option("--odometry-prior", arguments->names.odometry_prior,
               "Topic of the odometry prior; empty: none")
+      .corrected(to_topic_name_or_empty)
       .with_default();
-  command.option("--imu", arguments->names.imu, "Topic of the IMU; empty: none").with_default();
+  command.option("--imu", arguments->names.imu, "Topic of the IMU; empty: none")
+      .corrected(to_topic_name_or_empty)
+      .with_default();
   command.option("--gnss", arguments->names.gnss, "Topic of a GNSS receiver; empty: none")
+      .corrected(to_topic_name_or_empty)
       .with_default();
   command
       .option("--initial-pose", arguments->names.initial_pose,
               "Topic on which operators say where the robot is; empty: none")
+      .corrected(to_topic_name_or_empty)
       .with_default();
   command.option("--server", arguments->names.name_space, "First part of the server's topic names")
+      .corrected(to_topic_name)
       .with_default();
   command.option("--days", arguments->days, "How long the identities are valid")
       .between(1, 36500)

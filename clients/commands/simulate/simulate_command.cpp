@@ -35,6 +35,13 @@ Written write_sequence(const SimulateArguments& arguments, const simulation::Sim
                        StopSignal& stop) {
   const std::filesystem::path folder = arguments.out;
   KittiSequenceWriter writer(folder);
+  // Before the scans, so that they are there however the run ends.
+  const Eigen::Isometry3d T_city_first = simulation.T_map_lidar_at(0.0);
+  write_poses(folder / "first_pose_city.txt", {&T_city_first, 1});
+  if (arguments.imu) write_imu_csv(folder / "imu.csv", simulated_imu(simulation));
+  if (arguments.gnss_m > 0.0) {
+    write_gnss_csv(folder / "gnss.csv", simulated_gnss(simulation, {.wander_m = arguments.gnss_m}));
+  }
   const int scans = simulation.config().scans;
   Progress progress("simulate", "scans", static_cast<std::uint64_t>(scans));
   Written written;
@@ -46,12 +53,6 @@ Written write_sequence(const SimulateArguments& arguments, const simulation::Sim
     progress.update(static_cast<std::uint64_t>(written.scans));
   }
   writer.finish();
-  const Eigen::Isometry3d T_city_first = simulation.T_map_lidar_at(0.0);
-  write_poses(folder / "first_pose_city.txt", {&T_city_first, 1});
-  if (arguments.imu) write_imu_csv(folder / "imu.csv", simulated_imu(simulation));
-  if (arguments.gnss_m > 0.0) {
-    write_gnss_csv(folder / "gnss.csv", simulated_gnss(simulation, {.wander_m = arguments.gnss_m}));
-  }
   return written;
 }
 

@@ -5,6 +5,7 @@
 #include <system_error>
 #include <utility>
 
+#include "core/process/temporary_folder.hpp"
 #include "idl/dds/security/documents.hpp"
 #include "idl/dds/security/identity.hpp"
 #include "idl/dds/security/signed_document.hpp"
@@ -23,6 +24,21 @@ void make_folder(const fs::path& folder) {
   if (error) {
     throw SecurityError("folder " + folder.string() + " cannot be made: " + error.message());
   }
+}
+
+// Hidden: `name` is to be no identity before it is whole.
+TemporaryFolder fresh_folder(const fs::path& parent, const std::string& name) {
+  try {
+    return TemporaryFolder(parent / ("." + name + "."));
+  } catch (const fs::filesystem_error& error) {
+    throw SecurityError(parent.string() + " cannot be written: " + error.code().message());
+  }
+}
+
+void put(const fs::path& from, const fs::path& to) {
+  std::error_code error;
+  fs::rename(from, to, error);
+  if (error) throw SecurityError(to.string() + " cannot be written: " + error.message());
 }
 
 void write_text(const fs::path& file, const std::string& text) {
@@ -55,13 +71,14 @@ Authority Authority::make(const fs::path& folder, int days) {
                         " has an authority already; 'stillmap security add' makes more identities, "
                         "and a new authority needs another folder");
   }
-  make_folder(folder / "authority");
-  fs::permissions(folder / "authority", fs::perms::owner_all);
+  make_folder(folder);
+  const TemporaryFolder fresh = fresh_folder(folder, "authority");
   const PrivateKey key = PrivateKey::make();
   const Certificate certificate =
       Certificate::make_authority(key, "Stillmap authority", Validity::days_from_now(days));
-  key.write(key_in(folder));
-  certificate.write(certificate_in(folder));
+  key.write(fresh.path() / key_in(folder).filename());
+  certificate.write(fresh.path() / certificate_in(folder).filename());
+  put(fresh.path(), folder / "authority");
   return {folder, certificate, key};
 }
 
@@ -79,8 +96,8 @@ fs::path Authority::add(const std::string& name, const std::string& role, const 
   if (fs::exists(identity_folder) && !replace) {
     throw SecurityError(identity_folder.string() + " exists; --replace makes it anew");
   }
-  make_folder(identity_folder);
-  const IdentityFiles files(identity_folder);
+  const TemporaryFolder fresh = fresh_folder(folder_, name);
+  const IdentityFiles files(fresh.path());
   const PrivateKey key = PrivateKey::make();
   const Certificate certificate = Certificate::issue(key, name, role, validity, certificate_, key_);
   const Permissions permissions{
@@ -91,13 +108,20 @@ fs::path Authority::add(const std::string& name, const std::string& role, const 
   certificate_.write(files.permissions_authority);
   write_text(files.governance, sign_document(governance_text(), certificate_, key_));
   write_text(files.permissions, sign_document(to_text(permissions), certificate_, key_));
+  make_folder(identity_folder);
+  // The folder itself stays, with its owner and mode.
+  for (const fs::path& file : {files.key, files.certificate, files.identity_authority,
+                               files.permissions_authority, files.governance, files.permissions}) {
+    put(file, identity_folder / file.filename());
+  }
   return identity_folder;
 }
 
 std::vector<fs::path> Authority::identities() const {
   std::vector<fs::path> folders;
   for (const auto& entry : fs::directory_iterator(folder_)) {
-    if (entry.is_directory() && entry.path().filename() != "authority") {
+    const std::string name = entry.path().filename().string();
+    if (entry.is_directory() && name != "authority" && !name.starts_with('.')) {
       folders.push_back(entry.path());
     }
   }

@@ -19,7 +19,8 @@ class Authority {
   [[nodiscard]] static Authority open(const std::filesystem::path& folder);
 
   /// Makes an identity, or with `replace` a new one in its place; returns its folder. Throws
-  /// SecurityError for a name that cannot be a folder or exists.
+  /// SecurityError for a name that cannot be a folder or exists; one that cannot be written leaves
+  /// all as it was.
   std::filesystem::path add(const std::string& name, const std::string& role, const Access& access,
                             const Validity& validity, bool replace = false) const;
 

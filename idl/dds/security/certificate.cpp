@@ -13,6 +13,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <utility>
 
 namespace stillmap::dds {
 namespace {
@@ -47,6 +48,13 @@ OpenFile open_to_write(const fs::path& file, mode_t mode) {
     throw SecurityError(file.string() + " cannot be written: " + reason);
   }
   return {::fdopen(descriptor, "w"), std::fclose};
+}
+
+// What is written lies in memory until then: a full disk shows here first.
+void close_written(OpenFile opened, const fs::path& file) {
+  if (std::fclose(opened.release()) == 0) return;
+  const std::string reason = std::strerror(errno);
+  throw SecurityError(file.string() + " cannot be written: " + reason);
 }
 
 std::string text_of(const X509_NAME* name) {
@@ -134,9 +142,10 @@ PrivateKey PrivateKey::read(const fs::path& file) {
 }
 
 void PrivateKey::write(const fs::path& file) const {
-  const OpenFile opened = open_to_write(file, S_IRUSR | S_IWUSR);
+  OpenFile opened = open_to_write(file, S_IRUSR | S_IWUSR);
   require(PEM_write_PrivateKey(opened.get(), get(), nullptr, nullptr, 0, nullptr, nullptr) == 1,
           "write " + file.string());
+  close_written(std::move(opened), file);
 }
 
 Certificate Certificate::make_authority(const PrivateKey& key, const std::string& name,
@@ -175,8 +184,9 @@ Certificate Certificate::read(const fs::path& file) {
 }
 
 void Certificate::write(const fs::path& file) const {
-  const OpenFile opened = open_to_write(file, S_IRUSR | S_IWUSR | S_IRGRP | S_IROTH);
+  OpenFile opened = open_to_write(file, S_IRUSR | S_IWUSR | S_IRGRP | S_IROTH);
   require(PEM_write_X509(opened.get(), get()) == 1, "write " + file.string());
+  close_written(std::move(opened), file);
 }
 
 std::string Certificate::subject() const { return text_of(X509_get_subject_name(get())); }

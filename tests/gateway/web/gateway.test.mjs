@@ -155,7 +155,9 @@ describe("gateway", () => {
     assert.match(await exchange(port, "GET / HTTP/1.1\r\nHost: localhost\r\nOrigin: https://evil.example\r\n\r\n"), /^HTTP\/1.1 403/);
     assert.match(await exchange(port, "POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n"), /^HTTP\/1.1 405/);
     assert.match(await exchange(port, "GET /../../etc/passwd HTTP/1.1\r\nHost: localhost\r\n\r\n"), /^HTTP\/1.1 404/);
-    assert.equal(await exchange(port, `GET / HTTP/1.1\r\nHost: localhost\r\nX: ${"a".repeat(40000)}\r\n\r\n`), "");
+    assert.match(await exchange(port, `GET / HTTP/1.1\r\nHost: localhost\r\nX: ${"a".repeat(40000)}\r\n\r\n`), /^HTTP\/1.1 431/);
+    assert.match(await exchange(port, "POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5\r\n\r\nhello"), /^HTTP\/1.1 413/);
+    assert.match(await exchange(port, `POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 400000\r\n\r\n${"a".repeat(400000)}`), /^HTTP\/1.1 413/);
     assert.equal(await exchange(port, Buffer.from("\x16\x03\x01\x00\xa5\x01\x00\x00", "latin1")), "");
     // No subprotocol of ours.
     const error = await new Promise((resolve) => {

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace stillmap {
+
+inline constexpr std::string_view topic_rule =
+    "; ROS 2 names have letters, digits, '_', and '/' inside";
+
+/// Whether it is a ROS 2 name without the '/' at its front.
+[[nodiscard]] inline bool is_topic_name(std::string_view name) {
+  constexpr std::string_view allowed =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_/";
+  return !name.empty() && name.find_first_not_of(allowed) == std::string_view::npos &&
+         name.front() != '/' && name.back() != '/' && name.find("//") == std::string_view::npos;
+}
+
+/// Takes away the '/' at the front with which ROS 2's own tools print names. Returns what is wrong
+/// with the rest; empty where it is a name.
+[[nodiscard]] inline std::string to_topic_name(std::string& name) {
+  const std::string given = name;
+  if (name.starts_with('/')) name.erase(0, 1);
+  if (is_topic_name(name)) return {};
+  return "'" + given + "' is no topic name" + std::string(topic_rule);
+}
+
+/// The same where no topic may be named.
+[[nodiscard]] inline std::string to_topic_name_or_empty(std::string& name) {
+  return name.empty() ? std::string() : to_topic_name(name);
+}
+
+}  // namespace stillmap
