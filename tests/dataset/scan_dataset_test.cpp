@@ -206,8 +206,9 @@ TEST(ScanDataset, ACutOutOfASequenceKeepsItsTimesAndPoses) {
   write_kitti_times_ns(folder.path() / "times.txt", std::vector<std::int64_t>{70, 80});
   EXPECT_EQ(ScanDataset(folder.path()).stamp_ns(1), 80);
   write_kitti_times_ns(folder.path() / "times.txt", std::vector<std::int64_t>{70});
-  EXPECT_THAT(message_of<DatasetError>([&] { ScanDataset{folder.path()}; }),
-              AllOf(HasSubstr("times.txt"), HasSubstr("1 lines"), HasSubstr("scan 000003 needs line 4")));
+  EXPECT_THAT(
+      message_of<DatasetError>([&] { ScanDataset{folder.path()}; }),
+      AllOf(HasSubstr("times.txt"), HasSubstr("1 lines"), HasSubstr("scan 000003 needs line 4")));
 }
 
 TEST(ScanDataset, OneDamagedScanLeavesTheOthersReadable) {
