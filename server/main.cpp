@@ -6,17 +6,14 @@
 #include <csignal>
 #include <cstring>
 #include <exception>
-#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <set>
 #include <string>
-#include <system_error>
 
 #include "config/loaders/model_file.hpp"
 #include "config/loaders/openmp_waits.hpp"
 #include "core/map/storage/map_file.hpp"
-#include "core/map/storage/map_lock.hpp"
 #include "core/process/stop_signals.hpp"
 #include "idl/dds/dds_error.hpp"
 #include "idl/dds/dds_log.hpp"
@@ -62,19 +59,6 @@ std::unique_ptr<stillmap::Segmenter> open_labels(const stillmap::ServerConfig& c
   return labels;
 }
 
-/// Whether a map file that could not be used is there and of no other process: trying again does
-/// not mend it. What is missing may be mounted later, what is in use be let go.
-bool stays_unusable(const std::filesystem::path& map_file) {
-  std::error_code unknown;
-  if (!std::filesystem::exists(map_file, unknown)) return false;
-  try {
-    const stillmap::MapLock lock(map_file);
-    return true;
-  } catch (const stillmap::MapFileError&) {
-    return false;
-  }
-}
-
 /// Returns the exit code.
 int serve(const stillmap::ServerConfig& config) {
   sigset_t signals = stillmap::block_stop_signals();
@@ -105,15 +89,13 @@ int serve(const stillmap::ServerConfig& config) {
   return has_failed ? thread_failed : 0;
 }
 
-/// The same where the map file may be unusable.
+/// The same; trying again does not mend a map file that is none.
 int serve_in_file(const stillmap::ServerConfig& config) {
   try {
     return serve(config);
-  } catch (const stillmap::MapFileWriteError&) {
-    throw;  // The disk may be full.
-  } catch (const stillmap::MapFileError& error) {
+  } catch (const stillmap::UnusableMapFileError& error) {
     spdlog::critical("{}", error.what());
-    return stays_unusable(config.map.file) ? bad_input : failed;
+    return bad_input;
   }
 }
 

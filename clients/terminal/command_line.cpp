@@ -66,6 +66,18 @@ OptionHandle OptionHandle::above_zero_to(int most) {
   return *this;
 }
 
+OptionHandle OptionHandle::zero_to(int most) {
+  option_->check(
+      [most](const std::string& word) {
+        double value = 0.0;
+        const bool is_number = CLI::detail::lexical_cast(word, value) && std::isfinite(value);
+        if (is_number && value >= 0.0 && value <= most) return std::string();
+        return "'" + word + "' must be a number from 0 to " + std::to_string(most);
+      },
+      "0 to " + std::to_string(most));
+  return *this;
+}
+
 OptionHandle OptionHandle::between(int low, int high) {
   option_->check(CLI::Range(low, high));
   return *this;

@@ -30,6 +30,7 @@ class OptionHandle {
   OptionHandle above_zero();
   /// Above zero, and so much at most, which the help shows.
   OptionHandle above_zero_to(int most);
+  OptionHandle zero_to(int most);
   OptionHandle between(int low, int high);
   /// A list of exactly so many values.
   OptionHandle exactly(int values);

@@ -32,7 +32,7 @@ std::optional<SavedMap> saved_map(MapSaver& saver, const ServerConfig& config) {
     try {
       check_sizes(map, config.mapper.static_map);
     } catch (const std::invalid_argument& fault) {
-      throw MapFileError(config.map.file, fault.what());
+      throw UnusableMapFileError(config.map.file, fault.what());
     }
   });
   if (stored && !stored->view.tiles.empty()) {

@@ -183,9 +183,27 @@ TEST_F(MapFileTest, RefusesImpossibleSizes) {
 
 TEST_F(MapFileTest, RefusesAFolderAndAMissingFolder) {
   EXPECT_THAT([&] { (void)open_map_file(folder_.path()); },
-              testing::ThrowsMessage<MapFileError>(HasSubstr("is not a file")));
+              testing::ThrowsMessage<UnusableMapFileError>(HasSubstr("is not a file")));
   EXPECT_THAT([&] { (void)open_map_file(folder_ / "no" / "such" / "map"); },
               testing::ThrowsMessage<MapFileError>(HasSubstr("must exist and be writable")));
+}
+
+/// A server is started again for it.
+TEST_F(MapFileTest, WhatAnotherTryMayMendIsNotUnusable) {
+  open_map_file(file_)->save(saved_map(1));
+  SQLite::Database other(file_.string(), SQLite::OPEN_READWRITE);
+  other.exec("PRAGMA locking_mode = EXCLUSIVE");
+  other.exec("BEGIN EXCLUSIVE");
+  for (const fs::path& file : {file_, folder_ / "no" / "such" / "map"}) {
+    try {
+      (void)open_map_file(file);
+      ADD_FAILURE() << file << " was opened";
+    } catch (const UnusableMapFileError& error) {
+      ADD_FAILURE() << error.what();
+    } catch (const MapFileError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("cannot be opened"));
+    }
+  }
 }
 
 TEST_F(MapFileTest, RefusesAReadOnlyFolder) {

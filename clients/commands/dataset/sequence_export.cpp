@@ -44,7 +44,12 @@ class SequenceExporter {
   /// What was recorded beside these scans. Before them, so that it is there however the run ends.
   void export_samples(std::size_t first, std::size_t end) {
     if (first >= end) return;
-    const std::int64_t first_ns = dataset_.stamp_ns(first), last_ns = dataset_.stamp_ns(end - 1);
+    // A clock may have been set back meanwhile.
+    std::int64_t first_ns = dataset_.stamp_ns(first), last_ns = first_ns;
+    for (std::size_t index = first; index < end; ++index) {
+      first_ns = std::min(first_ns, dataset_.stamp_ns(index));
+      last_ns = std::max(last_ns, dataset_.stamp_ns(index));
+    }
     const auto imu = samples_around(dataset_.imu(), first_ns, last_ns);
     const auto gnss = samples_around(dataset_.gnss(), first_ns, last_ns);
     if (!imu.empty()) write_imu_csv(folder_ / "imu.csv", imu);

@@ -119,7 +119,7 @@ void add_evaluate_trajectory_command(CommandHandle evaluate, Action& action) {
   command
       .option("--max-difference", arguments->max_difference_s,
               "Poses with stamps pair when at most this far apart [s]")
-      .above_zero_to(3600)
+      .zero_to(3600)
       .with_default();
   command.option("--pictures", arguments->pictures,
                  "Folder for trajectory.png and trajectory_error.png");

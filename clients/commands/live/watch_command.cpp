@@ -135,7 +135,7 @@ void check_writable(const std::filesystem::path& file) {
   std::error_code unknown;
   // Its reader would take this for the end.
   if (std::filesystem::is_fifo(file, unknown)) return;
-  const bool is_new = !std::filesystem::exists(file, unknown);
+  const bool is_new = !std::filesystem::exists(std::filesystem::symlink_status(file, unknown));
   if (!std::ofstream(file, std::ios::app))
     throw DatasetWriteError(file, "cannot be written; check the folder and its permissions");
   if (is_new) std::filesystem::remove(file, unknown);

@@ -115,19 +115,19 @@ void check_header(const fs::path& file) {
   const std::string bytes = header_of(file);
   const std::string_view header = bytes;
   if (header.empty()) {
-    throw MapFileError(file, "is not a map file (no SQLite database); name another file");
+    throw UnusableMapFileError(file, "is not a map file (no SQLite database); name another file");
   }
   if (application_of(header) != application_id) {
-    throw MapFileError(file, "is a database of another program; name another file");
+    throw UnusableMapFileError(file, "is a database of another program; name another file");
   }
   const std::uint32_t version = big_endian(header.substr(60, 4));
   if (version > schema_version) {
-    throw MapFileError(file, "was written by a newer Stillmap (schema " + std::to_string(version) +
-                                 ", this one knows " + std::to_string(schema_version) +
-                                 "); update this program");
+    throw UnusableMapFileError(file, "was written by a newer Stillmap (schema " +
+                                         std::to_string(version) + ", this one knows " +
+                                         std::to_string(schema_version) + "); update this program");
   }
   if (version < oldest_schema_version) {
-    throw MapFileError(file, "is damaged: it has schema " + std::to_string(version));
+    throw UnusableMapFileError(file, "is damaged: it has schema " + std::to_string(version));
   }
 }
 
@@ -173,7 +173,8 @@ void check_integrity(SQLite::Database& database, const fs::path& file, const std
   SQLite::Statement check(database, "PRAGMA " + pragma);
   check.executeStep();
   if (const std::string verdict = check.getColumn(0).getString(); verdict != "ok") {
-    throw MapFileError(file, "is damaged (" + verdict + "); restore a copy or name another file");
+    throw UnusableMapFileError(file,
+                               "is damaged (" + verdict + "); restore a copy or name another file");
   }
 }
 
@@ -196,7 +197,8 @@ SQLite::Database connect(const fs::path& file) {
 
 SQLite::Database open_or_create(const fs::path& file) {
   if (!fs::exists(file) || (fs::is_regular_file(file) && fs::file_size(file) == 0)) create(file);
-  if (!fs::is_regular_file(file)) throw MapFileError(file, "is not a file; name another one");
+  if (!fs::is_regular_file(file))
+    throw UnusableMapFileError(file, "is not a file; name another one");
   check_header(file);
   put_away_other_log(file);
   SQLite::Database database = connect(file);
@@ -216,10 +218,12 @@ SQLite::Database opened(const fs::path& file, Open open) {
   } catch (const SQLite::Exception& error) {
     const bool is_damaged =
         error.getErrorCode() == SQLITE_CORRUPT || error.getErrorCode() == SQLITE_NOTADB;
-    throw MapFileError(file, is_damaged ? std::string("is damaged (") + error.what() +
-                                              "); restore a copy or name another file"
-                                        : std::string("cannot be opened (") + error.what() +
-                                              "); its folder must exist and be writable");
+    if (is_damaged) {
+      throw UnusableMapFileError(file, std::string("is damaged (") + error.what() +
+                                           "); restore a copy or name another file");
+    }
+    throw MapFileError(file, std::string("cannot be opened (") + error.what() +
+                                 "); its folder must exist and be writable");
   } catch (const fs::filesystem_error& error) {
     throw MapFileError(file, std::string("cannot be opened (") + error.what() +
                                  "); its folder must exist and be writable");

@@ -22,6 +22,12 @@ class MapFileError : public std::runtime_error {
       : std::runtime_error(file.string() + ": " + fault) {}
 };
 
+/// One that stays unusable however often it is tried: no map, of a newer version, damaged.
+class UnusableMapFileError : public MapFileError {
+ public:
+  using MapFileError::MapFileError;
+};
+
 /// One that cannot be written: the disk may be full.
 class MapFileWriteError : public MapFileError {
  public:
