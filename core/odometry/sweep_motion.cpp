@@ -32,11 +32,10 @@ SweepMotion::SweepMotion(const Eigen::Vector3d& translation,
 
 Eigen::Isometry3d SweepMotion::T_middle_at(double part) const {
   if (!rotation_is_measured()) return motion_of(part * twist_);
-  const double within = std::clamp(part, -0.5, 0.5);
-  const Eigen::Quaterniond R(interpolated(R_middle_at_, within).cast<double>());
+  const Eigen::Quaterniond R(interpolated(R_middle_at_, part).cast<double>());
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   T.translation() = part * twist_.head<3>();
-  T.linear() = R.normalized().toRotationMatrix() * so3_exp((part - within) * twist_.tail<3>());
+  T.linear() = R.normalized().toRotationMatrix();
   return T;
 }
 

@@ -18,8 +18,7 @@ class SweepMotion {
   /// middle (see InertialMotion); the translation, along the lidar's axes in the middle, is steady.
   SweepMotion(const Eigen::Vector3d& translation, std::vector<Eigen::Matrix3d> R_middle_at);
 
-  /// Pose of the lidar at a part of the sweep (-0.5 start, 0.5 end) in its frame at the middle;
-  /// beyond the sweep the motion goes on steadily.
+  /// Pose of the lidar at a part of the sweep (-0.5 start, 0.5 end) in its frame at the middle.
   [[nodiscard]] Eigen::Isometry3d T_middle_at(double part) const;
 
   /// Translation and rotation of the whole sweep.

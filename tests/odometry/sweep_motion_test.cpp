@@ -78,11 +78,5 @@ TEST(SweepCorrectionTest, PointsAndPosesFollowTheSameBentMotion) {
   EXPECT_TRUE(T_middle_at(motion, 0.0).isApprox(Eigen::Isometry3d::Identity()));
 }
 
-TEST(SweepMotion, GoesOnSteadilyBeyondTheSweep) {
-  const Eigen::Isometry3d T = late_turn().T_middle_at(1.0);
-  EXPECT_NEAR(so3_log(T.linear()).z(), 0.1 + 0.05, 1e-6);
-  EXPECT_NEAR(T.translation().x(), 1.0, 1e-9);
-}
-
 }  // namespace
 }  // namespace stillmap
