@@ -96,6 +96,8 @@ struct Odometry::State {
                  : confirmed_at_start(result, features, map, has_prior_map || goes_on, method());
     if (result.health == OdometryHealth::good && fits.is_contradicted_by_points(result))
       result = moved_where_points_agree(result, features, map, method());
+    if (fits.are_known() && is_unvouched(result, prediction, fits))
+      result.health = OdometryHealth::degenerate;
     keep_to_limits(last, prediction, !has_jumped, sensor.motion_limits, result);
   }
   /// Calls a pose good only where the map says so that is older than any doubt of the place.

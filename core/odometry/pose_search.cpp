@@ -96,6 +96,11 @@ std::size_t movable_points(const FeatureSets& features) {
       features.points, [](const FeaturePoint& point) { return is_movable(point.label); }));
 }
 
+bool is_where_motion_led(const OdometryResult& found, const PosePrediction& prediction) {
+  const PoseTangent off = boxminus(found.T_map_lidar, prediction.T_map_lidar);
+  return off.head<3>().norm() < foretold_distance_m && off.tail<3>().norm() < foretold_angle_rad;
+}
+
 /// Whether enough is left of the scan without what could move by its label.
 bool labels_tell_enough(const FeatureSets& features, const OdometryConfig& config) {
   constexpr std::size_t min_points = 100;
@@ -401,13 +406,19 @@ bool is_followed(double distance_m, const PosePrediction& prediction) {
   return distance_m < std::clamp(reach_m, min_gap_reach_m, max_gap_reach_m);
 }
 
+bool is_unvouched(const OdometryResult& found, const PosePrediction& prediction,
+                  const FitStatistics& fits) {
+  if (!prediction.is_known || prediction.is_prior) return false;
+  if (!fits.fits_poorly(found) || fits.believes_relocalized(found)) return false;
+  return !is_where_motion_led(found, prediction);
+}
+
 bool is_foretold(const OdometryResult& found, const FeatureSets& features, const LocalMap& map,
                  const PosePrediction& prediction, const FitStatistics& fits,
                  const OdometryConfig& config) {
   if (config.paper_exact || !prediction.is_known || prediction.is_prior) return false;
   if (found.health != OdometryHealth::good || !fits.believes_foretold(found)) return false;
-  const PoseTangent off = boxminus(found.T_map_lidar, prediction.T_map_lidar);
-  return off.head<3>().norm() < foretold_distance_m && off.tail<3>().norm() < foretold_angle_rad &&
+  return is_where_motion_led(found, prediction) &&
          confirmed_by_points(found, features, map, config).health == OdometryHealth::good;
 }
 

@@ -84,6 +84,11 @@ struct PosePrediction {
 /// unless traffic hid what it knew for a moment.
 [[nodiscard]] bool is_followed(double distance_m, const PosePrediction& prediction);
 
+/// Whether a pose fits so much worse than poses have lately that motion alone could vouch for it,
+/// and motion led elsewhere: for the length of a scan, streets of two cities may look alike.
+[[nodiscard]] bool is_unvouched(const OdometryResult& found, const PosePrediction& prediction,
+                                const FitStatistics& fits);
+
 /// Whether registration came by itself to where motion led, and the points agree: then the lidar is
 /// there, however little dense traffic leaves of what the map knows. Never of a prior's pose, which
 /// is no witness of its own, and not in the paper.

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/odometry/pose_search.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -64,6 +66,27 @@ TEST(FitStatistics, ALostScanTellsNothing) {
   lost.health = OdometryHealth::lost;
   fits.add(lost);
   EXPECT_FALSE(fits.is_contradicted_by_points(scan_moved_by(0.0)));
+}
+
+// The first scan of another city that was put in the place of a drive's own fitted like this.
+TEST(FitStatistics, MotionVouchesForAPoorFitOnlyWhereItLed) {
+  const FitStatistics fits = statistics_after(20);
+  PosePrediction prediction{.is_known = true};
+  OdometryResult found = scan_moved_by(0.0);
+  found.fit = 0.6;
+  found.upright_fit = 0.42;
+  ASSERT_TRUE(fits.believes(found));
+  EXPECT_FALSE(is_unvouched(found, prediction, fits));
+  found.T_map_lidar.translation().x() = 0.3;
+  EXPECT_TRUE(is_unvouched(found, prediction, fits));
+  prediction.is_prior = true;
+  EXPECT_FALSE(is_unvouched(found, prediction, fits));
+  prediction.is_prior = false;
+  found.upright_fit = 0.6;
+  EXPECT_FALSE(is_unvouched(found, prediction, fits)) << "what stands up fits";
+  found.upright_fit = 0.42;
+  found.fit = 0.8;
+  EXPECT_FALSE(is_unvouched(found, prediction, fits)) << "the whole fits";
 }
 
 }  // namespace
