@@ -21,6 +21,8 @@ std::string fault_of(const GnssFix& fix) {
     return named("the latitude", fix.latitude_deg) + ", beyond 84 degrees";
   if (!(std::abs(fix.longitude_deg) <= 360.0))
     return named("the longitude", fix.longitude_deg) + ", beyond 360 degrees";
+  if (fix.latitude_deg == 0.0 && fix.longitude_deg == 0.0)
+    return "the latitude and the longitude are 0, as those of a receiver that knows no place yet";
   if (!(std::abs(fix.altitude_m) <= max_altitude_m) && !std::isnan(fix.altitude_m))
     return named("the altitude", fix.altitude_m) + ", beyond 100 km";
   if (!fix.covariance_enu.allFinite()) return "the covariance is not finite";

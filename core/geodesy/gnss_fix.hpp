@@ -19,7 +19,8 @@ struct GnssFix {
 };
 
 /// Why no place can be taken from it, naming field and value; empty where one can. Positions within
-/// some 600 km of a pole are refused, as in datum_from_text().
+/// some 600 km of a pole are refused, as in datum_from_text(), and so is latitude and longitude 0,
+/// which receivers send that know no place yet.
 [[nodiscard]] std::string fault_of(const GnssFix& fix);
 
 }  // namespace stillmap

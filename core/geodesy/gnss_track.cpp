@@ -17,9 +17,23 @@ constexpr std::int64_t max_gap_ns = 1'500'000'000;
 constexpr double max_gap_m = 0.5;
 /// Of a height that is not known: one that is said to be worse is taken for that [m].
 constexpr double unknown_sigma_m = 1e4;
+/// No robot goes so far between two fixes: they are of different places [m].
+constexpr double max_jump_m = 50e3;
+/// Fixes of one place follow each other within this [m].
+constexpr double max_step_m = 5e3;
+/// So few fixes of another place are a fault of the receiver.
+constexpr std::size_t min_strays = 5;
 
 double horizontal_sigma_m(const GnssFix& fix) {
   return std::sqrt(0.5 * fix.covariance_enu.topLeftCorner<2, 2>().trace());
+}
+
+EastNorthUp frame_about(const GnssFix& fix) {
+  return {fix.latitude_deg, fix.longitude_deg, std::isnan(fix.altitude_m) ? 0.0 : fix.altitude_m};
+}
+
+double distance_m(const GnssFix& from, const GnssFix& to) {
+  return frame_about(from).position_enu(to).norm();
 }
 
 }  // namespace
@@ -35,10 +49,7 @@ std::string GnssTrack::add(const GnssFix& fix) {
     waiting_.pop_front();
     ++misplaced_;
   }
-  if (!enu_) {
-    enu_.emplace(fix.latitude_deg, fix.longitude_deg,
-                 std::isnan(fix.altitude_m) ? 0.0 : fix.altitude_m);
-  }
+  judge_origin(fix);
   waiting_.push_back(fix);
   waiting_.back().covariance_enu.diagonal().array() += config_.min_sigma_m * config_.min_sigma_m;
   const bool has_height =
@@ -49,6 +60,31 @@ std::string GnssTrack::add(const GnssFix& fix) {
     waiting_.back().covariance_enu(2, 2) = unknown_sigma_m * unknown_sigma_m;
   }
   return "";
+}
+
+void GnssTrack::judge_origin(const GnssFix& fix) {
+  if (!enu_) begin_at(fix);
+  if (distance_m(last_believed_, fix) <= max_jump_m) {
+    last_believed_ = fix;
+    ++believed_;
+    strays_ = 0;
+    return;
+  }
+  if (strays_ > 0 && distance_m(last_stray_, fix) > max_step_m) strays_ = 0;
+  if (strays_++ == 0) first_stray_ = fix;
+  last_stray_ = fix;
+  if (strays_ < min_strays || strays_ <= believed_) return;
+  begin_at(first_stray_);
+  believed_ = std::exchange(strays_, 0);
+  last_believed_ = fix;
+}
+
+void GnssTrack::begin_at(const GnssFix& fix) {
+  enu_ = frame_about(fix);
+  last_believed_ = fix;
+  ++origins_;
+  misplaced_ += std::erase_if(
+      waiting_, [&](const GnssFix& other) { return distance_m(fix, other) > max_jump_m; });
 }
 
 void GnssTrack::add_scan(std::size_t scan, std::int64_t stamp_ns,

@@ -29,13 +29,15 @@ struct PositionAtScan {
   std::size_t scan = 0;
   /// The antenna in the frame of that scan's lidar [m]: where it was a moment before.
   Eigen::Vector3d antenna_lidar = Eigen::Vector3d::Zero();
-  /// About the track's first fix [m].
+  /// About the track's origin [m].
   Eigen::Vector3d position_enu = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance_enu = Eigen::Matrix3d::Identity();
 };
 
 /// Puts the fixes of a receiver on the robot between the scans around them. Fixes and scans come in
-/// their own order, each after the other or before it, by one clock. NOT thread safe.
+/// their own order, each after the other or before it, by one clock. The first fix is the origin of
+/// the positions, unless more than so many that follow it (and five at least) lie together more
+/// than 50 km from it: the first of those is, then. NOT thread safe.
 class GnssTrack {
  public:
   explicit GnssTrack(const GnssConfig& config) : config_(config) {}
@@ -51,9 +53,12 @@ class GnssTrack {
 
   /// The frame of the positions; nothing before the first fix.
   [[nodiscard]] const std::optional<EastNorthUp>& enu() const { return enu_; }
+  /// How many origins there were: with another one the positions that were taken before mean
+  /// nothing any more.
+  [[nodiscard]] std::size_t origins() const { return origins_; }
   /// Fixes that were put between scans.
   [[nodiscard]] std::size_t placed() const { return placed_; }
-  /// Those that no two scans lie around.
+  /// Those that no two scans lie around, or that waited when another origin was found.
   [[nodiscard]] std::size_t misplaced() const { return misplaced_; }
 
  private:
@@ -63,10 +68,22 @@ class GnssTrack {
     Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
     Eigen::Vector3d antenna_odom = Eigen::Vector3d::Zero();
   };
+  /// Finds another origin where fixes say that they are of another place.
+  void judge_origin(const GnssFix& fix);
+  /// Drops what waits of other places.
+  void begin_at(const GnssFix& fix);
   [[nodiscard]] std::optional<PositionAtScan> between_scans(const GnssFix& fix) const;
 
   GnssConfig config_;
   std::optional<EastNorthUp> enu_;
+  std::size_t origins_ = 0;
+  /// Those that follow from the origin without a jump, and the last of them.
+  std::size_t believed_ = 0;
+  GnssFix last_believed_;
+  /// Those since then, of one other place.
+  std::size_t strays_ = 0;
+  GnssFix first_stray_;
+  GnssFix last_stray_;
   std::deque<GnssFix> waiting_;
   /// The newest.
   std::deque<ScanPose> scans_;

@@ -5,6 +5,13 @@
 
 namespace stillmap {
 
+std::string LiveLoopCloser::add(const GnssFix& fix) {
+  const std::size_t origins = gnss_.origins();
+  std::string refusal = gnss_.add(fix);
+  if (gnss_.origins() != origins) closer_.forget_positions();
+  return refusal;
+}
+
 std::optional<MapCorrection> LiveLoopCloser::add(const LabelledScan& scan,
                                                  const Eigen::Isometry3d& T_odom_lidar,
                                                  bool is_confirmed,

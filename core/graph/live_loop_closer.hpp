@@ -54,7 +54,7 @@ class LiveLoopCloser {
         is_in_earlier_map_(true) {}
 
   /// A fix, before or after the scans around it. Returns why it is not used; empty where it is.
-  [[nodiscard]] std::string add(const GnssFix& fix) { return gnss_.add(fix); }
+  [[nodiscard]] std::string add(const GnssFix& fix);
 
   /// The next scan of the map, by a pose that no correction moved, with the place of the receiver's
   /// antenna on its lidar. A correction is of the map as

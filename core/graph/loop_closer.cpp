@@ -99,6 +99,17 @@ void LoopCloser::add(const PositionAtScan& position) {
     positions_.back() = measured;
 }
 
+void LoopCloser::forget_positions() {
+  positions_.clear();
+  known_positions_ = 0;
+  settled_doubts_.reset();
+  if (!std::exchange(T_enu_map_, std::nullopt)) return;
+  graph_.positions.clear();
+  graph_.T_enu_map.setIdentity();
+  // What they bent goes back.
+  solve();
+}
+
 LoopCloser::PositionCounts LoopCloser::position_counts() const {
   if (!T_enu_map_) return {};
   PositionCounts counts{.used = graph_.positions.size(), .in_doubt = 0};

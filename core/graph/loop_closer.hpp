@@ -112,6 +112,8 @@ class LoopCloser {
   }
   /// A position of one of the scans added so far. Those of scans before the first node say nothing.
   void add(const PositionAtScan& position);
+  /// Those until now were about another origin than those that follow.
+  void forget_positions();
   /// The drive ended: its last stretch becomes a submap, too.
   void finish();
 

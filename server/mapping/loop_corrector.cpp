@@ -242,11 +242,21 @@ void LoopCorrector::hand_on_fixes(const Run& run) {
     return;
   }
   for (const GnssFix& fix : fixes) {
+    const std::size_t origins = closer_->gnss().origins();
     const std::string refusal = closer_->add(fix);
+    if (origins > 0 && closer_->gnss().origins() != origins) withdraw_place();
     if (refusal.empty()) continue;
     statistics_.count("gnss_fixes_refused");
     throttled_log_.warn("gnss", "a GNSS fix is not used: " + refusal);
   }
+}
+
+void LoopCorrector::withdraw_place() {
+  spdlog::warn(
+      "GNSS: the fixes until now are dropped, as more that followed them lie together more than "
+      "50 km away");
+  const std::scoped_lock lock(mutex_);
+  place_.reset();
 }
 
 void LoopCorrector::report_fixes() {

@@ -113,6 +113,8 @@ class LoopCorrector {
   void close(const ScanOfMap& scan, bool enters);
   [[nodiscard]] LiveLoopCloser closer_for(const Run& run) const;
   void hand_on_fixes(const Run& run);
+  /// Another origin of the fixes was found.
+  void withdraw_place();
   void report_fixes();
   void report_closures();
   void count_new(const char* counter, std::size_t now, std::size_t& reported);

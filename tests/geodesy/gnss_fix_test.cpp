@@ -32,5 +32,11 @@ TEST(GnssFix, SaysWhichFieldIsAtFault) {
   EXPECT_EQ(fault([&](GnssFix& f) { f.covariance_enu = along * along.transpose(); }), "");
 }
 
+TEST(GnssFix, LatitudeAndLongitudeZeroAreThoseOfAReceiverThatKnowsNoPlace) {
+  EXPECT_THAT(fault_of({.latitude_deg = 0.0, .longitude_deg = 0.0}), HasSubstr("longitude are 0"));
+  EXPECT_EQ(fault_of({.latitude_deg = 0.0, .longitude_deg = 8.4}), "");
+  EXPECT_EQ(fault_of({.latitude_deg = 49.0, .longitude_deg = 0.0}), "");
+}
+
 }  // namespace
 }  // namespace stillmap

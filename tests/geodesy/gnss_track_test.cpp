@@ -123,5 +123,65 @@ TEST_F(GnssTracks, WithoutScansItDoesNotGrow) {
   EXPECT_EQ(track_.misplaced(), 4000U);
 }
 
+/// Another fix than that, near where the equator and the meridian of Greenwich meet.
+GnssFix elsewhere(GnssFix fix) {
+  fix.latitude_deg = 0.001;
+  fix.longitude_deg = 0.0;
+  return fix;
+}
+
+TEST_F(GnssTracks, AFirstFixOfAnotherPlaceIsTheOriginUntilOthersContradictIt) {
+  scan(0, 0.0);
+  ASSERT_EQ(track_.add(elsewhere(fix_at(0.05))), "");
+  std::vector<PositionAtScan> placed;
+  for (std::size_t k = 1; k <= 10; ++k) {
+    const double time_s = 0.1 * static_cast<double>(k);
+    ASSERT_EQ(track_.add(fix_at(time_s - 0.05)), "");
+    EXPECT_EQ(track_.origins(), k < 5 ? 1U : 2U) << "five say it together";
+    scan(k, time_s);
+    placed = track_.take();
+  }
+  EXPECT_NEAR(track_.enu()->fix_at(Eigen::Vector3d::Zero()).latitude_deg, 49.0, 1e-3);
+  ASSERT_EQ(placed.size(), 1U);
+  const Eigen::Vector3d expected =
+      T_odom_lidar_at(0.95) * antenna_lidar - T_odom_lidar_at(0.05) * antenna_lidar;
+  EXPECT_LT((placed[0].position_enu - expected).norm(), 1e-3) << "about the first of the others";
+}
+
+TEST_F(GnssTracks, WhatWaitsOfAnotherPlaceIsDropped) {
+  ASSERT_EQ(track_.add(elsewhere(fix_at(0.05))), "");
+  for (int k = 1; k <= 5; ++k) ASSERT_EQ(track_.add(fix_at(0.05 + 0.001 * k)), "");
+  EXPECT_EQ(track_.misplaced(), 1U);
+  scan(0, 0.0);
+  scan(1, 0.1);
+  const auto placed = track_.take();
+  ASSERT_EQ(placed.size(), 5U);
+  for (const PositionAtScan& position : placed) EXPECT_LT(position.position_enu.norm(), 1.0);
+}
+
+TEST_F(GnssTracks, FewerStraysThanBelievedFixesMoveNothing) {
+  for (int k = 0; k < 10; ++k) ASSERT_EQ(track_.add(fix_at(k)), "");
+  for (int k = 10; k < 20; ++k) ASSERT_EQ(track_.add(elsewhere(fix_at(k))), "");
+  EXPECT_EQ(track_.origins(), 1U);
+  ASSERT_EQ(track_.add(fix_at(20.0)), "");
+  // Each of another place than the one before: what they have in common is that they err.
+  for (int k = 0; k < 50; ++k) {
+    GnssFix stray = fix_at(21.0 + k);
+    stray.latitude_deg = k % 2 == 0 ? 10.0 : -10.0;
+    ASSERT_EQ(track_.add(stray), "");
+  }
+  EXPECT_EQ(track_.origins(), 1U);
+}
+
+TEST_F(GnssTracks, ALongDriveKeepsItsOrigin) {
+  constexpr double spacing_m = 1000.0;
+  for (int k = 0; k < 300; ++k) {
+    GnssFix fix = earth.fix_at({spacing_m * k, 0.0, 0.0});
+    fix.stamp_ns = k * 10 * second_ns;
+    ASSERT_EQ(track_.add(fix), "");
+  }
+  EXPECT_EQ(track_.origins(), 1U);
+}
+
 }  // namespace
 }  // namespace stillmap

@@ -3,6 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <utility>
+
+#include "core/geodesy/east_north_up.hpp"
 #include "tests/graph/street_world.hpp"
 
 namespace stillmap {
@@ -35,6 +39,11 @@ class LiveDrive {
     scan.scan.stamp_ns = stamp_ns(in_map.size()) + clock_offset_ns;
     // As a mapper does.
     in_map.push_back(T_map_odom * T_odom_lidar_);
+    if (receiver) {
+      GnssFix fix = receiver(T_truth);
+      fix.stamp_ns = scan.scan.stamp_ns;
+      EXPECT_EQ(closer_.add(fix), "");
+    }
     const auto correction = closer_.add(scan, T_odom_lidar_, true);
     if (!correction) return;
     ++corrections;
@@ -65,6 +74,8 @@ class LiveDrive {
   Eigen::Isometry3d T_map_odom = Eigen::Isometry3d::Identity();
   std::int64_t clock_offset_ns = 0;
   int corrections = 0;
+  /// What a receiver with its antenna in the lidar says; none where there is none.
+  std::function<GnssFix(const Eigen::Isometry3d& T_truth)> receiver;
 
  private:
   static std::int64_t stamp_ns(std::size_t i) {
@@ -182,6 +193,30 @@ TEST(LiveLoopCloser, MemoryIsBounded) {
   drive.go(1.5 * StreetWorld::length_m);
   EXPECT_EQ(drive.closer().submap_bytes(), 0U);
   EXPECT_EQ(drive.corrections, 0);
+}
+
+TEST(LiveLoopCloser, AFirstFixOfAnotherPlaceDoesNotSayWhereTheMapLies) {
+  const EastNorthUp earth(49.0, 8.4, 115.0);
+  LiveDrive drive(12);
+  bool is_first = true;
+  drive.receiver = [&](const Eigen::Isometry3d& T_truth) {
+    GnssFix fix = earth.fix_at(T_truth.translation());
+    fix.covariance_enu = 0.0025 * Eigen::Matrix3d::Identity();
+    if (std::exchange(is_first, false)) {
+      fix.latitude_deg = 0.001;
+      fix.longitude_deg = 0.0;
+    }
+    return fix;
+  };
+  drive.go(0.4 * StreetWorld::length_m);
+  const auto place = drive.closer().on_earth();
+  ASSERT_TRUE(place);
+  EXPECT_NEAR(place->datum.latitude_deg, 49.0, 1e-5);
+  EXPECT_NEAR(place->datum.longitude_deg, 8.4, 1e-5);
+  EXPECT_NEAR(place->datum.x_axis_azimuth_deg, 90.0, 0.5);
+  const Eigen::Isometry3d T_error =
+      earth.T_earth(Eigen::Isometry3d::Identity()).inverse() * place->T_earth_map;
+  EXPECT_LT(Eigen::AngleAxisd(T_error.linear()).angle(), 0.02);
 }
 
 }  // namespace

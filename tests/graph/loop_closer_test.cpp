@@ -350,5 +350,20 @@ TEST(LoopCloser, NothingGivesNothing) {
   EXPECT_EQ(closer.corrected_poses().size(), 2U);
 }
 
+TEST(LoopCloser, PositionsAboutAnotherOriginAreForgotten) {
+  const StreetWorld world(12);
+  const Drive arc = drive(world, 0.3 * StreetWorld::length_m, 0.0003, 0.005);
+  LoopCloser closer = closed_with_fixes(world, arc, 0.05);
+  ASSERT_TRUE(closer.T_enu_map());
+  closer.forget_positions();
+  EXPECT_FALSE(closer.T_enu_map());
+  EXPECT_FALSE(closer.is_corrected());
+  EXPECT_EQ(closer.position_counts().used, 0U);
+  const std::vector<Eigen::Isometry3d> bent_back = closer.poses_by(closer.graph().T_map_node);
+  const auto last = arc.odometry.size() - 1;
+  EXPECT_LT((bent_back[last].translation() - arc.odometry[last].translation()).norm(), 0.05);
+  EXPECT_TRUE(closer.corrected_poses()[last].isApprox(arc.odometry[last], 0.0));
+}
+
 }  // namespace
 }  // namespace stillmap

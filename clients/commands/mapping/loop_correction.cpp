@@ -84,7 +84,9 @@ void LoopCorrection::close(std::size_t place, const LabelledScan& scan, bool ent
   const Eigen::Isometry3d& T_odom_lidar = T_odom_lidar_[place];
   closer_.add(scan, T_odom_lidar, enters, index_[place]);
   for (; next_fix_ < fixes_.size() && fixes_[next_fix_].stamp_ns <= stamp_ns; ++next_fix_) {
+    const std::size_t origins = gnss_.origins();
     const std::string refusal = gnss_.add(fixes_[next_fix_]);
+    if (gnss_.origins() != origins) closer_.forget_positions();
     if (refusal.empty()) continue;
     if (refused_fixes_++ == 0) refusal_ = refusal;
   }
