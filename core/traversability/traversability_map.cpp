@@ -126,6 +126,17 @@ std::vector<TileId> existing(const std::set<TileId>& ids, const TileStates& stat
   return found;
 }
 
+/// Null where it cannot be read now.
+std::shared_ptr<const Tile> with_voxels(const std::shared_ptr<const Tile>& tile,
+                                        TileReader* reader) {
+  if (reader == nullptr) return tile;
+  try {
+    return reader->read(tile);
+  } catch (const std::runtime_error&) {
+    return nullptr;
+  }
+}
+
 int margin_cells(double reach_m, double cell_m, int side) {
   return std::min(side, static_cast<int>(std::ceil(reach_m / cell_m)));
 }
@@ -144,8 +155,9 @@ struct TraversabilityMap::State {
 
   void set_map(const MapSnapshot& map);
   [[nodiscard]] ChangedCells update_columns(const MapSnapshot& map,
-                                            const ThrottleCallback& throttle);
-  [[nodiscard]] std::vector<const Tile*> renewed_tiles(const MapSnapshot& map) const;
+                                            const ThrottleCallback& throttle, TileReader* reader);
+  [[nodiscard]] std::vector<std::shared_ptr<const Tile>> renewed_tiles(
+      const MapSnapshot& map) const;
   void drop_missing(const MapSnapshot& map, ChangedCells& changes);
   [[nodiscard]] ChangedCells update_surfaces(const ChangedCells& columns,
                                              TraversabilityUpdate& report,
@@ -169,13 +181,14 @@ void TraversabilityMap::State::set_map(const MapSnapshot& map) {
   cell_m = map.voxel_size_m;
 }
 
-std::vector<const Tile*> TraversabilityMap::State::renewed_tiles(const MapSnapshot& map) const {
-  std::vector<const Tile*> renewed;
+std::vector<std::shared_ptr<const Tile>> TraversabilityMap::State::renewed_tiles(
+    const MapSnapshot& map) const {
+  std::vector<std::shared_ptr<const Tile>> renewed;
   for (const auto& tile : map.tiles) {
     const auto known = tiles.find(tile->info.id);
     if (known == tiles.end() || known->second.revision != tile->info.revision ||
         known->second.content_hash != tile->info.content_hash) {
-      renewed.push_back(tile.get());
+      renewed.push_back(tile);
     }
   }
   return renewed;
@@ -192,16 +205,19 @@ void TraversabilityMap::State::drop_missing(const MapSnapshot& map, ChangedCells
 }
 
 ChangedCells TraversabilityMap::State::update_columns(const MapSnapshot& map,
-                                                      const ThrottleCallback& throttle) {
+                                                      const ThrottleCallback& throttle,
+                                                      TileReader* reader) {
   ChangedCells changes;
   drop_missing(map, changes);
-  const std::vector<const Tile*> renewed = renewed_tiles(map);
+  const std::vector<std::shared_ptr<const Tile>> renewed = renewed_tiles(map);
   std::vector<std::shared_ptr<const ColumnTile>> columns(renewed.size());
   tbb::parallel_for(std::size_t{0}, renewed.size(), [&](std::size_t i) {
     if (throttle) throttle();
-    columns[i] = std::make_shared<const ColumnTile>(make_columns(*renewed[i], side));
+    if (const auto tile = with_voxels(renewed[i], reader))
+      columns[i] = std::make_shared<const ColumnTile>(make_columns(*tile, side));
   });
   for (std::size_t i = 0; i < renewed.size(); ++i) {
+    if (columns[i] == nullptr) continue;
     const TileInfo& info = renewed[i]->info;
     TileState& state = tiles[info.id];
     note_change(changes, info.id, state.columns.get(), columns[i].get());
@@ -302,11 +318,12 @@ TraversabilityMap::TraversabilityMap(TraversabilityMap&&) noexcept = default;
 TraversabilityMap& TraversabilityMap::operator=(TraversabilityMap&&) noexcept = default;
 
 TraversabilityUpdate TraversabilityMap::update(const MapSnapshot& map,
-                                               const ThrottleCallback& throttle) {
+                                               const ThrottleCallback& throttle,
+                                               TileReader* tiles) {
   state_->set_map(map);
   TraversabilityUpdate report;
   if (!map.tiles.empty()) {
-    const ChangedCells columns = state_->update_columns(map, throttle);
+    const ChangedCells columns = state_->update_columns(map, throttle, tiles);
     report.map_tiles = columns.size();
     const ChangedCells surfaces = state_->update_surfaces(columns, report, throttle);
     state_->classify_all(surfaces, report, throttle);

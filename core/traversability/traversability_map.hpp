@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/map/query/tile_reader.hpp"
 #include "core/map/throttle_callback.hpp"
 #include "core/map/tile.hpp"
 #include "core/traversability/robot_profile.hpp"
@@ -32,9 +33,12 @@ class TraversabilityMap {
   TraversabilityMap(TraversabilityMap&&) noexcept;
   TraversabilityMap& operator=(TraversabilityMap&&) noexcept;
 
-  /// Updates all profiles to this snapshot. Throws std::invalid_argument if a tile's side is not a
-  /// whole number of voxels.
-  TraversabilityUpdate update(const MapSnapshot& map, const ThrottleCallback& throttle = {});
+  /// Updates all profiles to this snapshot. Non-resident tiles that changed are read through
+  /// `tiles`, without which there must be none; one that cannot be read stays as it was, and is
+  /// tried again by the next update. Throws std::invalid_argument if a tile's side is not a whole
+  /// number of voxels.
+  TraversabilityUpdate update(const MapSnapshot& map, const ThrottleCallback& throttle = {},
+                              TileReader* tiles = nullptr);
 
   [[nodiscard]] const std::vector<RobotProfile>& profiles() const;
   /// View of a profile at the last update; null if there is no such profile.

@@ -1,5 +1,9 @@
 #include "server/publishers/map_publisher.hpp"
 
+#include <limits>
+#include <stdexcept>
+
+#include "core/map/voxel_grid.hpp"
 #include "idl/conversions/pose.hpp"
 #include "idl/conversions/to_cloud.hpp"
 
@@ -12,6 +16,7 @@ MapPublisher::MapPublisher(dds::Participant& participant, const dds::Topics& top
       map_frame_(config.frames.map),
       path_poses_(config.publish.path_poses),
       half_window_m_(static_cast<float>(config.publish.cloud_window_m / 2.0)),
+      reader_(tiles),
       tiles_(participant, topics, tiles, config.publish.tile_window_m),
       path_(participant, topics.path.dds_name, topics.path.writer),
       cloud_(participant, topics.static_cloud.dds_name, topics.static_cloud.writer),
@@ -49,8 +54,28 @@ void MapPublisher::publish_cloud() {
   const Eigen::Vector2f centre_map = pose.T_map_lidar.translation().head<2>().cast<float>();
   const Eigen::Vector2f half = Eigen::Vector2f::Constant(half_window_m_);
   const Eigen::AlignedBox2f window_map(centre_map - half, centre_map + half);
-  static_cast<void>(
-      cloud_.write(wire::to_cloud(*latest_map_.view(), window_map, pose.stamp_ns, map_frame_)));
+  MapSnapshot view = *latest_map_.view();
+  // What is missing follows in the next turn.
+  if (!read_window(view, window_map)) published_cloud_ = {};
+  static_cast<void>(cloud_.write(wire::to_cloud(view, window_map, pose.stamp_ns, map_frame_)));
+}
+
+bool MapPublisher::read_window(MapSnapshot& view, const Eigen::AlignedBox2f& window_map) {
+  constexpr double everywhere = std::numeric_limits<double>::infinity();
+  const Eigen::Vector2d low = window_map.min().cast<double>();
+  const Eigen::Vector2d high = window_map.max().cast<double>();
+  bool is_whole = true;
+  for (const auto& tile : tiles_in_box(view, {Eigen::Vector3d(low.x(), low.y(), -everywhere),
+                                              Eigen::Vector3d(high.x(), high.y(), everywhere)})) {
+    if (!is_non_resident(*tile)) continue;
+    try {
+      view.tiles.set(reader_.read(tile));
+    } catch (const std::runtime_error&) {
+      // Changed since, or not to be read now.
+      is_whole = false;
+    }
+  }
+  return is_whole;
 }
 
 }  // namespace stillmap::server

@@ -37,6 +37,8 @@ class MapPublisher {
   void publish_tiles();
   void publish_path();
   void publish_cloud();
+  /// The view, with the voxels of the tiles in the window. False where some cannot be read now.
+  [[nodiscard]] bool read_window(MapSnapshot& view, const Eigen::AlignedBox2f& window_map);
 
   const LatestMap& latest_map_;
   std::string map_frame_;
@@ -44,6 +46,7 @@ class MapPublisher {
   float half_window_m_;
   PathState published_path_;
   PathState published_cloud_;
+  TileReader& reader_;
   TilePublisher tiles_;
   dds::Writer<nav_msgs::msg::Path> path_;
   dds::Writer<sensor_msgs::msg::PointCloud2> cloud_;

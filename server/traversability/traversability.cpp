@@ -17,9 +17,12 @@ Traversability::Traversability(const ServerConfig& config, dds::Participant& par
   const auto publish = [this] {
     if (publisher_) publisher_->publish();
   };
-  thread_.emplace(std::move(robots),
-                  std::chrono::duration<double>(config.traversability.update_period_s), latest_map,
-                  snapshot_, statistics, publish, std::move(throttle));
+  thread_.emplace(
+      std::move(robots), std::chrono::duration<double>(config.traversability.update_period_s),
+      FollowedMap{.latest = latest_map,
+                  .tiles = tiles,
+                  .bytes_on_disk = (std::size_t{config.map.memory_limit_mib} << 20) / 8},
+      snapshot_, statistics, publish, std::move(throttle));
 }
 
 }  // namespace stillmap::server

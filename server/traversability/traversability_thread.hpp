@@ -6,7 +6,9 @@
 #include <optional>
 #include <vector>
 
+#include "core/map/query/tile_reader.hpp"
 #include "core/traversability/traversability_map.hpp"
+#include "server/monitoring/log.hpp"
 #include "server/monitoring/statistics.hpp"
 #include "server/publishers/latest_map.hpp"
 #include "server/threads/background_throttle.hpp"
@@ -14,6 +16,14 @@
 #include "server/traversability/traversability_snapshot.hpp"
 
 namespace stillmap::server {
+
+/// The map that is followed.
+struct FollowedMap {
+  const LatestMap& latest;
+  TileReader& tiles;
+  /// Memory for the traversability of tiles on disk, nearest first; that of resident ones is kept.
+  std::size_t bytes_on_disk = 0;
+};
 
 /// Keeps the traversability of all robots up to date with the map in a window round the robot, on a
 /// thread of idle priority that uses one core.
@@ -24,7 +34,7 @@ class TraversabilityThread {
   /// then is the latency "traversability". Publishes empty views at once. Throws
   /// std::invalid_argument for a robot with faults, or two of one name.
   TraversabilityThread(std::vector<RobotProfile> robots, std::chrono::duration<double> period,
-                       const LatestMap& latest_map, TraversabilitySnapshot& snapshot,
+                       const FollowedMap& map, TraversabilitySnapshot& snapshot,
                        Statistics& statistics, std::function<void()> updated,
                        ThrottleCallback throttle = {},
                        MonotonicClock& clock = MonotonicClock::steady(),
@@ -34,17 +44,20 @@ class TraversabilityThread {
   void follow_map(const std::stop_token& stop);
   /// While the map does not change: scans that tell no place drive through it, too.
   void follow_robot();
-  void update(const MapSnapshot& map);
+  void update_window();
+  /// The tiles in the window whose traversability is kept.
+  [[nodiscard]] MapSnapshot kept_part(const MapSnapshot& map);
   void publish();
 
   std::chrono::duration<double> period_;
-  const LatestMap& latest_map_;
+  FollowedMap map_;
   TraversabilitySnapshot& snapshot_;
   Statistics& statistics_;
   std::function<void()> updated_;
   ThrottleCallback throttle_;
   MonotonicClock& clock_;
   TraversabilityMap traversability_;
+  ThrottledLog throttled_log_;
   BackgroundScheduling scheduling_;
   bool has_begun_ = false;
   std::shared_ptr<const MapSnapshot> known_;

@@ -101,13 +101,16 @@ void tile_change_to_published_traversability(benchmark::State& state) {
   if (!map) return;
   const TraversabilityConfig config;
   server::LatestMap maps;
+  TileReader tiles;
   server::TraversabilitySnapshot areas;
   server::Statistics statistics;
   UpdateCount updates;
   const server::TraversabilityGridProvider grid_provider(config, "map", maps, areas);
   maps.begin(std::make_shared<const MapSnapshot>(*map), {});
   const server::TraversabilityThread thread(
-      load_robots(config), std::chrono::seconds(0), maps, areas, statistics, [&] {
+      load_robots(config), std::chrono::seconds(0),
+      server::FollowedMap{.latest = maps, .tiles = tiles, .bytes_on_disk = 0}, areas, statistics,
+      [&] {
         benchmark::DoNotOptimize(grid_provider.message(grid_provider.grid()));
         updates.add();
       });

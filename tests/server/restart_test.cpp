@@ -7,6 +7,9 @@
 
 #include "core/map/storage/map_file.hpp"
 #include "core/map/storage/map_sessions.hpp"
+#include "idl/dds/reader.hpp"
+#include "idl/interface/topics.hpp"
+#include "sensor_msgs.h"
 #include "tests/idl/vendor_participant.hpp"
 #include "tests/server/room_scans.hpp"
 #include "tests/server/server_process.hpp"
@@ -185,6 +188,15 @@ TEST(Restart, WhatDoesNotFitIntoMemoryIsServedFromTheFile) {
   std::size_t in_tiles = 0;
   for (const Tile& tile : tiles.tiles) in_tiles += tile.voxels.size();
   EXPECT_EQ(in_tiles, voxels);
+
+  // So is the cloud round the robot.
+  dds::Participant participant(setup.dds());
+  const auto topic = dds::Topics::in("stillmap").static_cloud;
+  dds::Reader<sensor_msgs::msg::PointCloud2> clouds(participant, topic.dds_name, topic.reader);
+  EXPECT_TRUE(eventually([&] {
+    sensor_msgs::msg::PointCloud2 cloud;
+    return clouds.take(cloud, {}, patience) && cloud.width() == voxels;
+  }));
 
   // And mapping goes on in it.
   ScanPublisher publisher(setup.publisher(true));

@@ -37,6 +37,16 @@ std::shared_ptr<const MapSnapshot> shared(const MapSnapshot& view) {
   return std::make_shared<const MapSnapshot>(view);
 }
 
+/// The tiles of a map, to be read as if they were on disk.
+class StoredTiles : public TileStore {
+ public:
+  explicit StoredTiles(MapSnapshot map) : map_(std::move(map)) {}
+  TileRecord load(TileId id) override { return {map_.tiles.find(id), nullptr}; }
+
+ private:
+  MapSnapshot map_;
+};
+
 /// A thread on a map of a road, 16 m by 16 m.
 class TraversabilityThreadTest : public testing::Test {
  protected:
@@ -51,8 +61,9 @@ class TraversabilityThreadTest : public testing::Test {
       ++updates_;
       updated_.notify_all();
     };
-    thread_.emplace(std::vector{square_robot(), small_robot()}, period, latest_map_, snapshot_,
-                    statistics_, updated, ThrottleCallback(), clock_, BackgroundScheduling::normal);
+    const FollowedMap map{.latest = latest_map_, .tiles = tiles_, .bytes_on_disk = bytes_on_disk_};
+    thread_.emplace(std::vector{square_robot(), small_robot()}, period, map, snapshot_, statistics_,
+                    updated, ThrottleCallback(), clock_, BackgroundScheduling::normal);
   }
 
   [[nodiscard]] bool wait_for_version(std::uint64_t version) {
@@ -67,6 +78,8 @@ class TraversabilityThreadTest : public testing::Test {
 
   VoxelWorld world_;
   LatestMap latest_map_;
+  TileReader tiles_;
+  std::size_t bytes_on_disk_ = 0;
   TraversabilitySnapshot snapshot_;
   Statistics statistics_;
   test::ManualClock clock_;
@@ -310,6 +323,34 @@ TEST_F(TraversabilityThreadTest, TheGridIsAWindowRoundTheRobot) {
   config.grid_profile = "";
   EXPECT_EQ(TraversabilityGridProvider(config, "map", latest_map_, snapshot_).grid().status,
             TraversabilityStatus::not_found);
+}
+
+// As after a start with a map file: nothing is in memory but what the first scans reach.
+TEST_F(TraversabilityThreadTest, TilesOnDiskAreInItAsFarAsMemoryAllows) {
+  world_.ground(8, -2, 400, 2, road);
+  const MapSnapshot whole = world_.view();
+  tiles_.use_tile_store(std::make_shared<StoredTiles>(whole));
+  MapSnapshot on_disk = whole;
+  for (const auto& tile : whole.tiles) on_disk.tiles.set(without_voxels(*tile));
+  latest_map_.publish(shared(on_disk));
+  bytes_on_disk_ = std::size_t{1} << 30;
+  start(0s);
+  ASSERT_TRUE(wait_for_version(whole.version));
+  EXPECT_EQ(snapshot_.view("small")->tiles.size(), whole.tiles.size());
+  const auto state_at = [&](double x_m) {
+    return test::look(*snapshot_.view("small"), x_m, 0.1).cell.state;
+  };
+  for (const double x_m : {1.1, 50.1, 390.1}) EXPECT_EQ(state_at(x_m), CellState::free) << x_m;
+
+  thread_.reset();
+  constexpr std::size_t tiles = 20;
+  bytes_on_disk_ = tiles * 20 * 20 * 56;
+  start(0s);
+  ASSERT_TRUE(wait_for_version(whole.version));
+  EXPECT_LE(snapshot_.view("small")->tiles.size(), tiles);
+  EXPECT_GE(snapshot_.view("small")->tiles.size(), tiles - 4) << "as far as these";
+  EXPECT_EQ(state_at(1.1), CellState::free);
+  EXPECT_EQ(state_at(390.1), CellState::unknown);
 }
 
 }  // namespace
