@@ -55,24 +55,14 @@ sensor_msgs::msg::PointCloud2 read_cloud(CdrReader cdr) {
   return cloud;
 }
 
-/// Labels that Stillmap's own replay sent; 8 bits are something else.
-bool has_semantic_kitti_labels(const sensor_msgs::msg::PointCloud2& cloud) {
-  for (const auto& field : cloud.fields()) {
-    if (field.name() == "label")
-      return field.datatype() > sensor_msgs::msg::PointField_Constants::UINT8;
-  }
-  return false;
-}
-
 DecodedScan from_cloud(CdrReader cdr) {
   const sensor_msgs::msg::PointCloud2 cloud = read_cloud(cdr);
   auto [scan, fault, understood] = wire::to_scan(cloud, {});
   if (!scan) throw CdrError(fault.reason);
   DecodedScan read{.frame = {.scan = *std::move(scan), .raw_labels = {}}, .sensor = {}};
-  if (has_semantic_kitti_labels(cloud)) {
-    for (const SemanticClass label : read.frame.scan.labels) {
-      read.frame.raw_labels.push_back(semantic_kitti_id(label));
-    }
+  // SemanticKITTI ids, as Stillmap's own replay sends them.
+  for (const SemanticClass label : read.frame.scan.labels) {
+    read.frame.raw_labels.push_back(semantic_kitti_id(label));
   }
   return read;
 }

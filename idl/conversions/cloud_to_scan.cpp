@@ -216,9 +216,14 @@ SemanticClass class_of(std::uint32_t value, bool is_class) {
                                       : SemanticClass::unlabeled;
 }
 
+/// SemanticKITTI's ids need more than 8 bits: a field of 8 is something else.
+bool holds_labels(const PointColumn& column, bool are_classes) {
+  return are_classes || size_of(column.type) > 1;
+}
+
 std::vector<SemanticClass> read_labels(const PointCloud2& cloud, const CloudLayout& layout,
                                        bool are_classes) {
-  if (!layout.label) return {};
+  if (!layout.label || !holds_labels(*layout.label, are_classes)) return {};
   std::vector<SemanticClass> labels(layout.points());
   for_each_value(cloud, layout, *layout.label, [&](std::size_t i, auto value) {
     labels[i] = class_of(static_cast<std::uint32_t>(value), are_classes);
@@ -236,9 +241,14 @@ std::string source_of(const char* what, const std::optional<PointColumn>& column
   return text.append(")");
 }
 
-std::string describe(const CloudLayout& layout, const PointTimes& times) {
-  return source_of("intensity", layout.intensity) + ", " +
-         source_of("time", layout.time, times.remark) + ", " + source_of("ring", layout.ring);
+std::string describe(const CloudLayout& layout, const PointTimes& times, bool labels_are_classes) {
+  std::string text = source_of("intensity", layout.intensity) + ", " +
+                     source_of("time", layout.time, times.remark) + ", " +
+                     source_of("ring", layout.ring);
+  if (!layout.label) return text;
+  const bool is_used = holds_labels(*layout.label, labels_are_classes);
+  const char* const kind = labels_are_classes ? "classes" : "SemanticKITTI ids";
+  return text + ", " + source_of("label", layout.label, is_used ? kind : "ignored");
 }
 
 }  // namespace
@@ -255,7 +265,7 @@ ScanFromCloud to_scan(const PointCloud2& cloud, const CloudReadOptions& options)
   const auto [layout, fault] = check_layout(cloud, options.fields);
   if (!layout) return {.scan = std::nullopt, .fault = fault, .format = {}};
   PointTimes times = read_time(cloud, *layout, *stamp);
-  std::string format = describe(*layout, times);
+  std::string format = describe(*layout, times, options.labels_are_classes);
   return {.scan = Scan{.stamp_ns = *stamp,
                        .points_lidar = read_points(cloud, *layout),
                        .intensity = read_intensity(cloud, *layout, options.intensity_scale),

@@ -15,7 +15,8 @@ struct CloudReadOptions {
   /// Brings the sensor's intensity to 0..1.
   float intensity_scale = 1.0F;
   /// The label field holds classes 0..19; otherwise original SemanticKITTI ids, of which only the
-  /// class is kept (moving-car becomes car).
+  /// class is kept (moving-car becomes car). Then a field of 8 bits is something else: it is left
+  /// out.
   bool labels_are_classes = false;
 };
 
@@ -32,7 +33,8 @@ struct ScanFromCloud {
   std::optional<Scan> scan;
   CloudFault fault;
   /// How the cloud was understood, for people: "intensity from reflectivity (uint16), time from t
-  /// (uint32: ns from the stamp), ring from ring (uint8)".
+  /// (uint32: ns from the stamp), ring from ring (uint8)", and where there is a label field what it
+  /// is taken for: "label from label (uint8: ignored)".
   std::string format;
 };
 

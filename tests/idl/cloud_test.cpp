@@ -14,6 +14,8 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::FloatNear;
+using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::Pointwise;
 
 Scan random_scan(std::size_t points) {
@@ -217,6 +219,26 @@ TEST(MapToCloud, ShowsTheVoxelsInTheWindow) {
   ASSERT_TRUE(back.scan);
   EXPECT_THAT(back.scan->points_lidar, ElementsAre(tile.voxels[0].mean_map));
   EXPECT_THAT(back.scan->labels, ElementsAre(SemanticClass::building));
+}
+
+TEST(CloudToScan, LabelsOf8BitsAreNoSemanticKittiIds) {
+  const auto signed_bytes = three_points_with<std::int8_t>("label", FieldType::int8, {0, 10, 40});
+  const auto bytes = three_points_with<std::uint8_t>("label", FieldType::uint8, {0, 10, 252});
+  for (const auto& cloud : {signed_bytes, bytes}) {
+    const ScanFromCloud back = to_scan(cloud, {});
+    ASSERT_TRUE(back.scan) << back.fault.reason;
+    EXPECT_TRUE(back.scan->labels.empty()) << "the network is to say what the points are";
+  }
+}
+
+TEST(CloudToScan, SaysWhatTheLabelFieldIsTakenFor) {
+  const auto bytes = three_points_with<std::uint8_t>("label", FieldType::uint8, {1, 2, 3});
+  const auto ids = three_points_with<std::uint32_t>("label", FieldType::uint32, {10, 40, 50});
+  const CloudReadOptions classes{.fields = {}, .labels_are_classes = true};
+  EXPECT_THAT(to_scan(bytes, {}).format, HasSubstr("label from label (uint8: ignored)"));
+  EXPECT_THAT(to_scan(bytes, classes).format, HasSubstr("label from label (uint8: classes)"));
+  EXPECT_THAT(to_scan(ids, {}).format, HasSubstr("label from label (uint32: SemanticKITTI ids)"));
+  EXPECT_THAT(to_scan(three_points(), {}).format, Not(HasSubstr("label")));
 }
 
 }  // namespace
