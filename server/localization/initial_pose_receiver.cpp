@@ -7,6 +7,7 @@
 
 #include "idl/conversions/localization.hpp"
 #include "idl/interface/topics.hpp"
+#include "server/monitoring/shown_name.hpp"
 
 namespace stillmap::server {
 
@@ -29,7 +30,7 @@ void InitialPoseReceiver::take(const PoseWithCovarianceStamped& message) {
   const wire::InitialPose initial = wire::from_message(message);
   if (!initial.guess) return refuse(initial.fault);
   if (initial.frame != map_frame_) {
-    return refuse("it is in the frame '" + initial.frame +
+    return refuse("it is in the frame '" + shown_name(initial.frame) +
                   "' (header.frame_id), and the map's is '" + map_frame_ +
                   "'; set it as the fixed frame of RViz2");
   }

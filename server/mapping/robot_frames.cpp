@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "server/monitoring/shown_name.hpp"
+
 namespace stillmap::server {
 namespace {
 
@@ -42,7 +44,7 @@ bool RobotFrames::locate_lidar(const std::string& cloud_frame, bool map_begins) 
     if (T_base_lidar->isApprox(T_base_lidar_, same_mount)) return true;
     statistics_.count("mount_changed");
     throttled_log_.warn("mount", "/tf_static now has another transform " + frames_.base + " -> " +
-                                     lidar_ +
+                                     shown_name(lidar_) +
                                      ": it counts from the next map on ('stillmap reset')");
     return true;
   }
@@ -73,14 +75,15 @@ std::optional<Eigen::Isometry3d> RobotFrames::published_mount() {
 
 std::string RobotFrames::missing() const {
   if (!other_lidar_.empty()) {
-    return "the map is made of clouds of '" + lidar_ + "', and these are of '" + other_lidar_ +
+    return "the map is made of clouds of '" + shown_name(lidar_) + "', and these are of '" +
+           shown_name(other_lidar_) +
            "': give each lidar a topic of its own, or list both under 'sensors'";
   }
-  std::string text = "no transform " + frames_.base + " -> " + lidar_ +
+  std::string text = "no transform " + frames_.base + " -> " + shown_name(lidar_) +
                      " on /tf_static; frames there: " +
                      (static_transforms_ ? static_transforms_->known_frames() : "none");
   if (lidar_ != cloud_frame_) {
-    text += "; the clouds name '" + cloud_frame_ + "': frames.lidar: \"\" takes that";
+    text += "; the clouds name '" + shown_name(cloud_frame_) + "': frames.lidar: \"\" takes that";
   }
   return text +
          "; publish it (robot_state_publisher, static_transform_publisher), or set mount: "

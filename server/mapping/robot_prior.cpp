@@ -1,6 +1,7 @@
 #include "server/mapping/robot_prior.hpp"
 
 #include "core/frames/rigid_motion.hpp"
+#include "server/monitoring/shown_name.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -25,7 +26,7 @@ std::optional<Eigen::Isometry3d> RobotPrior::lidar_motion(std::int64_t from_ns,
   const auto T_lidar_frame = frames_.T_lidar_frame(motion->frame);
   if (T_lidar_frame) return motion_of_frame(*T_lidar_frame, motion->T_before_after);
   refuse("odometry_prior_unknown_frame",
-         "it moves the frame '" + motion->frame +
+         "it moves the frame '" + shown_name(motion->frame) +
              "' (child_frame_id), and where that is on the robot is not known; set frames.base "
              "and mount, or publish it on /tf_static beneath frames.base");
   return std::nullopt;
@@ -35,9 +36,9 @@ OdomPose RobotPrior::pose_in_odom(std::int64_t stamp_ns, const Eigen::Isometry3d
   const auto prior = prior_ != nullptr ? prior_->pose_at(stamp_ns) : std::nullopt;
   const auto T_lidar_frame = prior ? frames_.T_lidar_frame(prior->frame) : std::nullopt;
   if (prior && prior->odom_frame != odom_frame_) {
-    refuse("odometry_prior_unknown_frame", "its poses are in the frame '" + prior->odom_frame +
-                                               "' (header.frame_id), and frames.odom is '" +
-                                               odom_frame_ + "'");
+    refuse("odometry_prior_unknown_frame",
+           "its poses are in the frame '" + shown_name(prior->odom_frame) +
+               "' (header.frame_id), and frames.odom is '" + odom_frame_ + "'");
   } else if (T_lidar_frame) {
     const Eigen::Isometry3d T_base_frame = frames_.T_base_lidar() * *T_lidar_frame;
     T_map_odom_ = T_map_base * T_base_frame * prior->T_odom_frame.inverse();

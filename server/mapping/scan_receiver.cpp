@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <sstream>
+#include <string_view>
 #include <utility>
 
 #include "core/lidar/prepare.hpp"
 #include "core/lidar/sensor_fit.hpp"
 #include "idl/conversions/header.hpp"
 #include "idl/interface/topics.hpp"
+#include "server/monitoring/shown_name.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -203,8 +205,10 @@ std::vector<ScanReceiver::Lidar> ScanReceiver::lidars_on(const ServerConfig& con
 }
 
 ScanReceiver::Lidar* ScanReceiver::lidar_of(const std::string& frame) {
+  // Drivers of old have a '/' there, which the configuration leaves away.
+  const std::string_view name = std::string_view(frame).substr(frame.starts_with('/') ? 1 : 0);
   const auto found = std::ranges::find_if(
-      lidars_, [&](const Lidar& lidar) { return lidar.frame.empty() || lidar.frame == frame; });
+      lidars_, [&](const Lidar& lidar) { return lidar.frame.empty() || lidar.frame == name; });
   return found == lidars_.end() ? nullptr : &*found;
 }
 
@@ -240,7 +244,7 @@ void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std:
   Lidar* const lidar = lidar_of(frame);
   if (lidar == nullptr) {
     return drop("unknown_frame", 1,
-                "a cloud on " + topic_ + " has the frame '" + frame +
+                "a cloud on " + topic_ + " has the frame '" + shown_name(frame) +
                     "', which no lidar of 'sensors' on this topic has");
   }
   auto [from_cloud, cloud_changes] = lidar->reader.read(cloud);

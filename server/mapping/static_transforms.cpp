@@ -1,6 +1,7 @@
 #include "server/mapping/static_transforms.hpp"
 
 #include "idl/conversions/pose.hpp"
+#include "server/monitoring/shown_name.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -62,7 +63,7 @@ std::string StaticTransforms::known_frames() const {
   const std::vector<std::string> frames = tree_.frames();
   std::string text = frames.empty() ? "none" : "";
   for (std::size_t i = 0; i < frames.size() && i < max_frames_shown; ++i) {
-    text += (i > 0 ? ", " : "") + frames[i];
+    text += (i > 0 ? ", " : "") + shown_name(frames[i]);
   }
   return frames.size() > max_frames_shown ? text + ", ..." : text;
 }

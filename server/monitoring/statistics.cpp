@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "server/monitoring/metrics.hpp"
+#include "server/monitoring/shown_name.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -33,7 +34,7 @@ void Statistics::scan_received() {
 
 void Statistics::record_scan_header(const std::string& frame, double delay_s) {
   const std::scoped_lock lock(mutex_);
-  scan_frame_ = frame;
+  scan_frame_ = shown_name(frame);
   scan_delay_s_ = delay_s;
 }
 

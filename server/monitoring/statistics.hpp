@@ -31,7 +31,8 @@ class Statistics {
   [[nodiscard]] Metrics& metrics() { return *metrics_; }
 
   void scan_received();
-  /// The last cloud named this frame, and came so much later than its stamp says.
+  /// The last cloud named this frame, which is reported by its shown_name(), and came so much later
+  /// than its stamp says.
   void record_scan_header(const std::string& frame, double delay_s);
   void scan_mapped(LabelProvenance label_provenance);
   /// How scans are segmented from now on; the shares are ignored.

@@ -107,5 +107,13 @@ TEST_F(HostileInput, ScansWithAllPointsEqualOrHalfNanDoNoHarm) {
   EXPECT_EQ(now.health, OdometryHealth::good);
 }
 
+TEST_F(HostileInput, FramesOfAnyLengthAndContentAreShownInALine) {
+  const std::string frame = "fr\nont\xFF" + std::string(100'000, 'x');
+  send(wire::to_cloud(room_scan(0), {}, frame));
+  const dds::ServerStatus now = status();
+  EXPECT_EQ(now.counter("scans_mapped"), 1U);
+  EXPECT_EQ(now.scan_frame, "fr?ont?" + std::string(93, 'x') + "...");
+}
+
 }  // namespace
 }  // namespace stillmap::test

@@ -108,5 +108,13 @@ TEST(RobotFrames, AMapIsMadeOfOneLidar) {
   EXPECT_EQ(frames.lidar(), "rear");
 }
 
+TEST(RobotFrames, ShowsNoMoreOfAForeignNameThanALine) {
+  Statistics statistics;
+  RobotFrames frames(from_tf_static(0.0, false), nullptr, statistics);
+  EXPECT_FALSE(frames.locate_lidar("velo\ndyne" + std::string(1'000'000, 'x'), true));
+  EXPECT_THAT(frames.missing(), HasSubstr("base_link -> velo?dynexxx"));
+  EXPECT_LT(frames.missing().size(), 1000U);
+}
+
 }  // namespace
 }  // namespace stillmap::server
