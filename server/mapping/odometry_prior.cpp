@@ -1,6 +1,7 @@
 #include "server/mapping/odometry_prior.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "idl/conversions/pose.hpp"
@@ -11,8 +12,10 @@ namespace {
 
 // At 100 Hz, 10 s: more than any scan waits in the queue.
 constexpr std::size_t max_poses = 1000;
-// A pose this much older than the scan still stands for it.
-constexpr std::int64_t max_gap_ns = 100'000'000;
+// So long past its newest pose an odometry is taken to go on as it went,
+constexpr std::int64_t max_ahead_ns = 100'000'000;
+// where its poses came no farther apart than this.
+constexpr std::int64_t max_gap_ns = 250'000'000;
 // The next pose of an odometry comes sooner.
 constexpr std::int64_t max_step_ns = 5'000'000'000;
 // So many poses in a row, each after the other, are of the odometry's clock, whatever the poses
@@ -21,6 +24,33 @@ constexpr std::size_t proof_of_clock = 5;
 
 bool follows(const StampedPose& before, const StampedPose& after) {
   return after.stamp_ns > before.stamp_ns && after.stamp_ns - before.stamp_ns <= max_step_ns;
+}
+
+Eigen::Isometry3d between(const StampedPose& before, const StampedPose& after,
+                          std::int64_t stamp_ns) {
+  const double share = static_cast<double>(stamp_ns - before.stamp_ns) /
+                       static_cast<double>(after.stamp_ns - before.stamp_ns);
+  const Eigen::Quaterniond q_before(before.T_map_lidar.rotation());
+  const Eigen::Quaterniond q_after(after.T_map_lidar.rotation());
+  const Eigen::Vector3d t_before = before.T_map_lidar.translation();
+  const Eigen::Vector3d t_after = after.T_map_lidar.translation();
+  return Eigen::Isometry3d(Eigen::Translation3d(t_before + share * (t_after - t_before)) *
+                           q_before.slerp(share, q_after));
+}
+
+// This long after the newest pose: the motion of as long a time before it is made once more, so
+// that stamps which jitter are not made speeds of. The newest pose where that motion is not known.
+Eigen::Isometry3d carried_on(const std::deque<StampedPose>& poses, std::int64_t ahead_ns) {
+  const StampedPose& newest = poses.back();
+  const std::int64_t earlier_ns = newest.stamp_ns - ahead_ns;
+  const auto after = std::ranges::upper_bound(poses, earlier_ns, {}, &StampedPose::stamp_ns);
+  if (after == poses.begin()) return newest.T_map_lidar;
+  const StampedPose& before = *std::prev(after);
+  if (after->stamp_ns - before.stamp_ns > max_gap_ns) return newest.T_map_lidar;
+  const Eigen::Isometry3d T_odom_earlier = between(before, *after, earlier_ns);
+  const Eigen::Isometry3d carried =
+      newest.T_map_lidar * (T_odom_earlier.inverse() * newest.T_map_lidar);
+  return carried.matrix().allFinite() ? carried : newest.T_map_lidar;
 }
 
 }  // namespace
@@ -41,20 +71,13 @@ bool PoseBuffer::add(const StampedPose& pose) {
 std::optional<Eigen::Isometry3d> PoseBuffer::pose_at(std::int64_t stamp_ns) const {
   const auto after = std::ranges::lower_bound(poses_, stamp_ns, {}, &StampedPose::stamp_ns);
   if (after == poses_.end()) {
-    const bool near = !poses_.empty() && stamp_ns - poses_.back().stamp_ns <= max_gap_ns;
-    return near ? std::optional(poses_.back().T_map_lidar) : std::nullopt;
+    const bool near = !poses_.empty() && stamp_ns - poses_.back().stamp_ns <= max_ahead_ns;
+    if (!near) return std::nullopt;
+    return carried_on(poses_, stamp_ns - poses_.back().stamp_ns);
   }
   if (after->stamp_ns == stamp_ns) return after->T_map_lidar;
   if (after == poses_.begin()) return std::nullopt;
-  const auto before = std::prev(after);
-  const double share = static_cast<double>(stamp_ns - before->stamp_ns) /
-                       static_cast<double>(after->stamp_ns - before->stamp_ns);
-  const Eigen::Quaterniond q_before(before->T_map_lidar.rotation());
-  const Eigen::Quaterniond q_after(after->T_map_lidar.rotation());
-  const Eigen::Vector3d t_before = before->T_map_lidar.translation();
-  const Eigen::Vector3d t_after = after->T_map_lidar.translation();
-  return Eigen::Isometry3d(Eigen::Translation3d(t_before + share * (t_after - t_before)) *
-                           q_before.slerp(share, q_after));
+  return between(*std::prev(after), *after, stamp_ns);
 }
 
 std::optional<Eigen::Isometry3d> PoseBuffer::motion(std::int64_t from_ns,

@@ -22,12 +22,14 @@ class PoseBuffer {
   /// place of what was there.
   bool add(const StampedPose& pose);
 
-  /// Motion of that frame from one time to another, interpolated; nothing when the poses do not
+  /// Motion of that frame from one time to another, by pose_at(); nothing when the poses do not
   /// reach that far.
   [[nodiscard]] std::optional<Eigen::Isometry3d> motion(std::int64_t from_ns,
                                                         std::int64_t to_ns) const;
 
-  /// Interpolated, in the other odometry's own frame; nothing when the poses do not reach that far.
+  /// Interpolated, in the other odometry's own frame; up to 100 ms after the newest pose, which may
+  /// be on its way still, as the frame moved until then. Nothing when the poses do not reach that
+  /// far.
   [[nodiscard]] std::optional<Eigen::Isometry3d> pose_at(std::int64_t stamp_ns) const;
 
  private:

@@ -294,12 +294,13 @@ class OdometryPriorFrames : public Frames {
   /// writer at some time, and leaves out what it has.
   void drive_with_wheels(
       int scans, const std::string& child_frame,
-      const Eigen::Isometry3d& T_wheels_after_reset = Eigen::Isometry3d::Identity()) {
+      const Eigen::Isometry3d& T_wheels_after_reset = Eigen::Isometry3d::Identity(),
+      int poses = seen_scans + 2) {
     const auto topic = dds::odometry_prior_topic("odom_prior");
     dds::Writer<nav_msgs::msg::Odometry> wheels(*participant_, topic.dds_name, {.depth = 100});
     ASSERT_TRUE(wheels.readers().wait_for_any(patience));
     // Once: what came earlier and comes again looks like a clock that was set back.
-    for (int i = 0; i < seen_scans + 2; ++i) {
+    for (int i = 0; i < poses; ++i) {
       const auto none = Eigen::Matrix<double, 6, 6>::Zero();
       const Eigen::Isometry3d T =
           i < seen_scans / 2 ? T_wheels_base(i) : T_wheels_after_reset * T_wheels_base(i);
@@ -446,6 +447,37 @@ TEST_F(SeveralLidars, ACloudOfNoneOfThemIsRefused) {
   ASSERT_TRUE(stranger.publish(mounted_scan(0, rear_mount()), {}, patience));
   EXPECT_TRUE(eventually([&] { return client_->status().dropped("unknown_frame") == 1; }));
   EXPECT_THAT(client_->status().reason, HasSubstr("'camera'"));
+}
+
+TEST_F(OdometryPriorFrames, TheirOwnOdomStaysWhereItIsWhileTheNextPoseIsOnItsWay) {
+  start("frames: {base: base_link, odom: wheel_odom, odom_source: prior}\n" +
+        std::string(turned_mount_yaml));
+  dds::Reader<tf2_msgs::msg::TFMessage> tf(*participant_, topics_.tf.dds_name, topics_.tf.reader);
+  ASSERT_TRUE(tf.events().wait_for_writer(patience));
+  // The newest pose is of the last scan but one.
+  drive_with_wheels(seen_scans, "base_link", Eigen::Isometry3d::Identity(), seen_scans - 1);
+  std::vector<Eigen::Vector3d> origin_map;
+  for (int i = 0; i < seen_scans; ++i) {
+    tf2_msgs::msg::TFMessage message;
+    ASSERT_TRUE(tf.take(message, {}, patience)) << i;
+    const std::vector<FrameTransform> chain = wire::from_tf(message);
+    ASSERT_EQ(chain.size(), 1U);
+    EXPECT_EQ(chain[0].child, "wheel_odom");
+    origin_map.push_back(chain[0].T_parent_child.translation());
+  }
+  // The robot has gone 0.15 m since.
+  EXPECT_LT((origin_map.back() - origin_map.at(origin_map.size() - 2)).norm(), 0.08);
+}
+
+TEST_F(SeveralLidars, AreKnownByTheirFramesWithASlash) {
+  ScanPublisher old_driver = publisher_on("rear/points", "/rear_lidar");
+  constexpr int scans = 3;
+  for (int i = 0; i < scans; ++i) {
+    ASSERT_TRUE(front_->publish(mounted_scan(i, tilted_mount()), {}, patience));
+    ASSERT_TRUE(old_driver.publish(mounted_scan(i, rear_mount()), {}, patience));
+  }
+  ASSERT_TRUE(wait_for_scans(*client_, scans));
+  EXPECT_EQ(client_->status().dropped(), 0U);
 }
 
 }  // namespace

@@ -41,10 +41,10 @@ TEST(PoseBuffer, KnowsNothingOfOtherTimes) {
   EXPECT_FALSE(PoseBuffer().motion(0, 1));
 }
 
-TEST(PoseBuffer, StretchesTheNewestPoseALittle) {
+TEST(PoseBuffer, CarriesTheNewestMotionOnALittle) {
   const auto motion = drive().motion(900 * ms, 1050 * ms);
   ASSERT_TRUE(motion);
-  EXPECT_TRUE(motion->translation().isApprox(Eigen::Vector3d(1.0, 0.0, 0.0), 1e-9));
+  EXPECT_TRUE(motion->translation().isApprox(Eigen::Vector3d(1.5, 0.0, 0.0), 1e-9));
 }
 
 TEST(PoseBuffer, BeginsAnewWhereTheClockWasSet) {
@@ -78,6 +78,58 @@ TEST(PoseBuffer, LeavesOutWhatComesOutOfOrder) {
   EXPECT_TRUE(poses.motion(400 * ms, 600 * ms)
                   ->translation()
                   .isApprox(Eigen::Vector3d(2.0, 0.0, 0.0), 1e-9));
+}
+
+TEST(PoseBuffer, CarriesACurveOn) {
+  const Eigen::Isometry3d step(Eigen::Translation3d(1.0, 0.2, 0.0) *
+                               Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ()));
+  PoseBuffer poses;
+  Eigen::Isometry3d T_odom_robot = at(3.0, 0.5);
+  for (int i = 0; i <= 10; ++i) {
+    poses.add({i * 100 * ms, T_odom_robot});
+    T_odom_robot = T_odom_robot * step;
+  }
+  const auto motion = poses.motion(1000 * ms, 1100 * ms);
+  ASSERT_TRUE(motion);
+  EXPECT_TRUE(motion->isApprox(step, 1e-9)) << motion->matrix();
+}
+
+TEST(PoseBuffer, CarriesNothingOnThatHasStopped) {
+  PoseBuffer poses = drive();
+  for (int i = 11; i <= 13; ++i) poses.add({i * 100 * ms, at(10.0, 0.0)});
+  const auto motion = poses.motion(1300 * ms, 1390 * ms);
+  ASSERT_TRUE(motion);
+  EXPECT_LT(motion->translation().norm(), 1e-9);
+}
+
+TEST(PoseBuffer, StampsThatJitterAreNoSpeed) {
+  constexpr double speed_m_s = 10.0;
+  constexpr double jitter_s = 0.002;
+  // The last two stamps are 14 ms apart, and 6 ms.
+  for (const int last : {100, 99}) {
+    PoseBuffer poses;
+    std::int64_t newest_ns = 0;
+    for (int i = 0; i <= last; ++i) {
+      newest_ns = i * 10 * ms + (i % 2 == 0 ? 2 * ms : -2 * ms);
+      poses.add({newest_ns, at(0.01 * speed_m_s * i, 0.0)});
+    }
+    const auto x_after_50_ms = [&] {
+      return poses.pose_at(newest_ns + 50 * ms)->translation().x();
+    };
+    const double expected = speed_m_s * (1e-9 * static_cast<double>(newest_ns) + 0.05);
+    EXPECT_NEAR(x_after_50_ms(), expected, 4.0 * jitter_s * speed_m_s) << last;
+    // One more of nearly the same stamp, a centimetre on.
+    poses.add({newest_ns += 1000, at(0.01 * speed_m_s * last + 0.01, 0.0)});
+    EXPECT_NEAR(x_after_50_ms(), expected, 4.0 * jitter_s * speed_m_s) << last;
+  }
+}
+
+TEST(PoseBuffer, TheNewestPoseStandsWhereItsMotionIsNotKnown) {
+  PoseBuffer poses;
+  poses.add({0, at(3.0, 0.0)});
+  EXPECT_EQ(poses.pose_at(50 * ms)->translation().x(), 3.0) << "there is one";
+  poses.add({1000 * ms, at(13.0, 0.0)});
+  EXPECT_EQ(poses.pose_at(1050 * ms)->translation().x(), 13.0) << "a second lies between them";
 }
 
 }  // namespace
