@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace stillmap {
 
@@ -28,6 +30,17 @@ inline constexpr std::string_view topic_rule =
 /// The same where no topic may be named.
 [[nodiscard]] inline std::string to_topic_name_or_empty(std::string& name) {
   return name.empty() ? std::string() : to_topic_name(name);
+}
+
+/// What is wrong with a list of topics, to be read after its name; empty where it has one or more,
+/// each once.
+[[nodiscard]] inline std::string topic_list_fault(const std::vector<std::string>& names) {
+  if (names.empty()) return "names no topic; give one or more";
+  for (auto name = names.begin(); name != names.end(); ++name) {
+    if (std::find(names.begin(), name, *name) == name) continue;
+    return "names '" + *name + "' twice; name a topic once, also where lidars share it";
+  }
+  return {};
 }
 
 }  // namespace stillmap

@@ -20,7 +20,8 @@ void append(Names& names, const Names& more) {
 
 /// Topics that the server reads and does not write itself.
 Names inputs(const TopicNames& names) {
-  Names topics{"rt/" + names.points};
+  Names topics;
+  for (const std::string& points : names.points) topics.push_back("rt/" + points);
   if (!names.odometry_prior.empty()) topics.push_back("rt/" + names.odometry_prior);
   if (!names.imu.empty()) topics.push_back("rt/" + names.imu);
   if (!names.gnss.empty()) topics.push_back("rt/" + names.gnss);

@@ -29,7 +29,8 @@ enum class Role {
 
 /// Names that a deployment chooses: ROS 2 names, as in the server's configuration.
 struct TopicNames {
-  std::string points = "points";
+  /// Of every lidar's clouds.
+  std::vector<std::string> points{"points"};
   /// Empty: none.
   std::string odometry_prior = "odom_prior";
   /// Empty: none.

@@ -136,5 +136,56 @@ TEST_F(HelpTest, TopicNamesGoWithoutTheirFirstSlashAndTheRestIsRefused) {
   EXPECT_EQ(names.at("namespace"), "bot");
 }
 
+TEST_F(HelpTest, SecurityTakesTheTopicsOfSeveralLidars) {
+  const std::string init = "security init " + path("keys");
+  for (const auto& [points, refused] :
+       {std::pair(" --points /a/points b a/points", "--points names 'a/points' twice"),
+        std::pair(" --points a ''", "--points: '' is no topic name"),
+        std::pair(" --points a b//c", "--points: 'b//c' is no topic name"),
+        std::pair(" --points", "--points: 1 required")}) {
+    const ProcessResult result = run(init + points);
+    EXPECT_EQ(result.exit_code, 2) << points;
+    EXPECT_THAT(result.err, HasSubstr(refused)) << points;
+    EXPECT_FALSE(exists("keys")) << points;
+  }
+  const ProcessResult made = run(init + " --points front/points /rear/points --days 30");
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  for (const char* identity : {"server", "sensor", "planner", "operator"}) {
+    EXPECT_THAT(content(std::string("keys/") + identity + "/permissions.p7s"),
+                AllOf(HasSubstr("rt/front/points"), HasSubstr("rt/rear/points")))
+        << identity;
+  }
+}
+
+TEST_F(HelpTest, SecurityKeepsOneTopicOrSeveralForLaterIdentities) {
+  ASSERT_EQ(run("security init " + path("keys") + " --points front/points rear/points").exit_code,
+            0);
+  const std::string file = "keys/authority/topics.json";
+  EXPECT_EQ(nlohmann::json::parse(content(file)).at("points"),
+            nlohmann::json::array({"front/points", "rear/points"}));
+  const std::string add = "security add " + path("keys") + " ";
+  const ProcessResult of_several = run(add + "several --role sensor");
+  EXPECT_EQ(of_several.exit_code, 0) << of_several.err;
+  EXPECT_THAT(content("keys/several/permissions.p7s"),
+              AllOf(HasSubstr("rt/front/points"), HasSubstr("rt/rear/points")));
+
+  const std::string rest = R"(, "odometry_prior": "", "namespace": "stillmap"})";
+  write(file, R"({"points": "top/points")" + rest);
+  const ProcessResult of_one = run(add + "one --role sensor");
+  EXPECT_EQ(of_one.exit_code, 0) << of_one.err;
+  EXPECT_THAT(content("keys/one/permissions.p7s"),
+              AllOf(HasSubstr("rt/top/points"), testing::Not(HasSubstr("rt/front/points"))));
+
+  for (const auto& [points, refused] : {std::pair("[]", "'points' names no topic"),
+                                        std::pair(R"(["a", "a"])", "'points' names 'a' twice"),
+                                        std::pair("7", "does not name the topics")}) {
+    write(file, R"({"points": )" + std::string(points) + rest);
+    const ProcessResult result = run(add + "none --role sensor");
+    EXPECT_EQ(result.exit_code, 2) << points;
+    EXPECT_THAT(result.err, AllOf(HasSubstr("topics.json"), HasSubstr(refused))) << points;
+    EXPECT_FALSE(exists("keys/none")) << points;
+  }
+}
+
 }  // namespace
 }  // namespace stillmap::test

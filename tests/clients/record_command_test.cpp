@@ -6,6 +6,8 @@
 #include "core/dataset/scan_dataset.hpp"
 #include "idl/bag/bag.hpp"
 #include "idl/bag/bag_scan_source.hpp"
+#include "idl/dds/writer.hpp"
+#include "idl/interface/topics.hpp"
 #include "tests/clients/command_test.hpp"
 #include "tests/idl/bag_fixture.hpp"
 
@@ -204,6 +206,50 @@ TEST_F(RecordTest, ARunOverOneTopicIsNotResumedOverAnother) {
   const ProcessResult same = run(map + " --topic-in a --resume");
   EXPECT_EQ(same.exit_code, 0) << same.err;
   EXPECT_EQ(line_count("out/poses_lidar.txt"), 12U);
+}
+
+TEST_F(RecordTest, EveryLidarIsRecordedOnItsOwnTopic) {
+  dds::DdsOptions options;
+  options.domain_id = static_cast<std::uint32_t>(domain_);
+  dds::Participant participant(options);
+  const dds::TopicQos qos = dds::points_topic("", DeliveryMode::latest, 5).writer;
+  using Lidar = dds::Writer<sensor_msgs::msg::PointCloud2>;
+  Lidar front(participant, "rt/front/points", qos), rear(participant, "rt/rear/points", qos);
+  for (const std::string format : {"sqlite", "mcap"}) {
+    BackgroundProcess record(stillmap_program() + " record " + path(format) + " --format " +
+                                 format + " --points front/points /rear/points" + on_domain(),
+                             folder_ / "record.log");
+    for (Lidar* lidar : {&front, &rear}) {
+      ASSERT_TRUE(lidar->readers().wait_for_any(patience)) << content("record.log");
+    }
+    ASSERT_TRUE(front.write(wire::to_cloud(dds::bag_scan(0), {}, "front")));
+    ASSERT_TRUE(front.write(wire::to_cloud(dds::bag_scan(1), {}, "front")));
+    ASSERT_TRUE(rear.write(wire::to_cloud(dds::bag_scan(2), {}, "rear")));
+    EXPECT_TRUE(comes_to_hold(format, "/front/points", 2)) << content("record.log");
+    EXPECT_TRUE(comes_to_hold(format, "/rear/points", 1)) << content("record.log");
+    EXPECT_EQ(record.stop(), 0) << content("record.log");
+    EXPECT_EQ(dds::open_sequence(path(format), "front/points").stamp_ns(1),
+              dds::bag_scan(1).stamp_ns);
+    EXPECT_EQ(dds::open_sequence(path(format), "rear/points").stamp_ns(0),
+              dds::bag_scan(2).stamp_ns);
+    // The next recorder is to be a new reader.
+    ASSERT_TRUE(eventually([&] { return front.readers().count() + rear.readers().count() == 0; }));
+  }
+}
+
+TEST_F(RecordTest, TopicsOfSeveralLidarsCanBeChosenFrom) {
+  const std::string record = "record " + path("bag") + " --for 0.1" + on_domain();
+  const ProcessResult unknown = run(record + " --topics front/points");
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("--points names those of lidars"));
+  const ProcessResult twice = run(record + " --points /a a");
+  EXPECT_EQ(twice.exit_code, 2);
+  EXPECT_THAT(twice.err, HasSubstr("--points names 'a' twice"));
+  EXPECT_FALSE(exists("bag"));
+  const ProcessResult chosen = run(record + " --points a b c --topics a c tf");
+  EXPECT_EQ(chosen.exit_code, 1);
+  EXPECT_THAT(chosen.out, AllOf(HasSubstr("/a: 0"), HasSubstr("/c: 0"), HasSubstr("/tf: 0"),
+                                testing::Not(HasSubstr("/b: 0"))));
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 namespace stillmap::dds {
 namespace {
 
-const TopicNames names{.points = "lidar/points",
+const TopicNames names{.points = {"lidar/points"},
                        .odometry_prior = "odom",
                        .imu = "imu",
                        .initial_pose = "set_pose",
@@ -80,6 +80,23 @@ TEST(RolesTest, HaveNames) {
   EXPECT_EQ(role_from_name("planner"), Role::planner);
   EXPECT_FALSE(role_from_name("king"));
   EXPECT_EQ(role_names(), "server, sensor, planner, operator");
+}
+
+TEST(RolesTest, KnowTheTopicsOfSeveralLidars) {
+  const TopicNames two{.points = {"front/points", "rear/points"}};
+  const Access server = access_of(Role::server, two);
+  const Access sensor = access_of(Role::sensor, two);
+  for (const std::string topic : {"rt/front/points", "rt/rear/points"}) {
+    EXPECT_TRUE(server.may_subscribe(topic)) << topic;
+    EXPECT_FALSE(server.may_publish(topic)) << topic;
+    EXPECT_TRUE(sensor.may_publish(topic)) << topic;
+    for (const Role role : {Role::planner, Role::operator_of_server}) {
+      EXPECT_TRUE(access_of(role, two).may_subscribe(topic)) << topic;
+      EXPECT_FALSE(access_of(role, two).may_publish(topic)) << topic;
+    }
+  }
+  EXPECT_FALSE(server.may_subscribe("rt/points"));
+  EXPECT_FALSE(sensor.may_publish("rt/points"));
 }
 
 }  // namespace

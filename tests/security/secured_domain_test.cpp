@@ -239,5 +239,28 @@ TEST_F(SecuredDomain, IsMadeWholeOrNotAtAll) {
   EXPECT_EQ(made.exit_code, 0) << made.err;
 }
 
+TEST_F(SecuredDomain, LetsTheServerReadSeveralLidars) {
+  const std::filesystem::path keys = folder_ / "lidars";
+  const ProcessResult made = run_stillmap(
+      "security init " + keys.string() + " --points front/points rear/points", folder_.path());
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const ServiceSetup setup("every", "save_period_s: 3600",
+                           "frames: {base: base_link}\n"
+                           "sensors:\n"
+                           "  - {name: front, sensor: vlp_16, topic: front/points}\n"
+                           "  - {name: rear, sensor: vlp_16, topic: rear/points}");
+  std::string command = stillmap_server_program();
+  for (const std::string& word : setup.server_arguments()) command += " " + word;
+  const BackgroundProcess server(command + " --security " + (keys / "server").string(),
+                                 folder_ / "server.log");
+  Client planner = client(keys / "planner");
+  planner.wait_for_server(patience);
+  const std::filesystem::path sensor = keys / "sensor";
+  ScanPublisher front({.dds = dds(sensor), .points_topic = "front/points", .lossless = true});
+  ScanPublisher rear({.dds = dds(sensor), .points_topic = "rear/points", .lossless = true});
+  EXPECT_TRUE(front.wait_for_subscriber(patience)) << content_of(folder_ / "server.log");
+  EXPECT_TRUE(rear.wait_for_subscriber(patience)) << content_of(folder_ / "server.log");
+}
+
 }  // namespace
 }  // namespace stillmap::test

@@ -38,8 +38,8 @@ struct RecorderOptions {
   dds::DdsOptions dds;
   /// First part of the server's topic names.
   std::string server_name = "stillmap";
-  /// The sensor's topic, and that of its odometry.
-  std::string points_topic = "points";
+  /// The sensor's topic, or those of several lidars, and that of the odometry.
+  std::vector<std::string> points_topics{"points"};
   std::string odometry_topic = "odom_prior";
   std::string imu_topic = "imu/data";
   std::string gnss_topic = "fix";
@@ -84,12 +84,14 @@ RecordableTopic recordable(const dds::TopicSpec<T>& topic) {
 }
 
 std::vector<RecordableTopic> recordable_topics(const RecorderOptions& options) {
-  std::vector<RecordableTopic> topics{
-      recordable(dds::points_topic(options.points_topic, DeliveryMode::latest, max_waiting)),
-      recordable(dds::odometry_prior_topic(options.odometry_topic)),
-      recordable(dds::imu_topic(options.imu_topic, DeliveryMode::latest)),
-      recordable(dds::gnss_topic(options.gnss_topic, DeliveryMode::latest)),
-      recordable(dds::initial_pose_topic(options.initial_pose_topic))};
+  std::vector<RecordableTopic> topics;
+  for (const std::string& points : options.points_topics) {
+    topics.push_back(recordable(dds::points_topic(points, DeliveryMode::latest, max_waiting)));
+  }
+  topics.push_back(recordable(dds::odometry_prior_topic(options.odometry_topic)));
+  topics.push_back(recordable(dds::imu_topic(options.imu_topic, DeliveryMode::latest)));
+  topics.push_back(recordable(dds::gnss_topic(options.gnss_topic, DeliveryMode::latest)));
+  topics.push_back(recordable(dds::initial_pose_topic(options.initial_pose_topic)));
   dds::for_each_topic(dds::Topics::in(options.server_name),
                       [&](const auto& topic) { topics.push_back(recordable(topic)); });
   return topics;
@@ -109,7 +111,7 @@ std::vector<RecordableTopic> chosen_topics(const RecorderOptions& options) {
       std::string known;
       for (const RecordableTopic& topic : all) known.append(" ").append(ros_name(topic));
       throw std::invalid_argument("topic '" + requested + "' cannot be recorded; there are" +
-                                  known);
+                                  known + "; --points names those of lidars");
     }
     const bool is_new =
         std::ranges::find(chosen, found->dds_name, &RecordableTopic::dds_name) == chosen.end();
@@ -261,6 +263,8 @@ dds::mcap::Compression compression_named(const std::string& name) {
 }
 
 RecorderOptions recorder_options(const RecordArguments& arguments) {
+  const std::string fault = topic_list_fault(arguments.recorder.points_topics);
+  if (!fault.empty()) throw std::invalid_argument("--points " + fault);
   RecorderOptions options = arguments.recorder;
   options.dds = arguments.client.dds(DdsRole::sensor);
   options.server_name = arguments.client.server_name;
@@ -357,7 +361,9 @@ void add_record_command(CommandHandle program, Action& action) {
                  "ROS 2 names of the topics to record; default: all of the sensor and the server");
   command.option("--for", arguments->seconds, "Stop after so many seconds; default: at Ctrl-C")
       .above_zero();
-  command.option("--points", arguments->recorder.points_topic, "The sensor's topic")
+  command
+      .option("--points", arguments->recorder.points_topics,
+              "The sensor's topic; of several lidars, each one's")
       .corrected(to_topic_name)
       .with_default();
   command.option("--odometry", arguments->recorder.odometry_topic, "The odometry prior's topic")
@@ -380,6 +386,7 @@ void add_record_command(CommandHandle program, Action& action) {
       "Examples:\n"
       "  stillmap record tour\n"
       "  stillmap record tour --for 60 --topics points stillmap/odometry tf\n"
+      "  stillmap record tour --points front/points rear/points     # several lidars\n"
       "  stillmap replay tour --topic-in points\n"
       "  stillmap record tour --format mcap    # for Foxglove, Lichtblick, and ROS 2 from Iron on\n"
       "Writes what DDS carried, byte for byte, as ROS 2 Humble's rosbag2 in SQLite storage or as\n"

@@ -481,9 +481,9 @@ void add_replay_command(CommandHandle program, Action& action) {
               "Begin when so many take the scans: the server, and 'stillmap record', say")
       .between(1, 1000)
       .with_default();
-  command.option("--frame", arguments->frame, "The clouds' frame (header.frame_id)").with_default();
+  add_frame_option(command, "--frame", arguments->frame, "The clouds' frame (header.frame_id)");
   add_mount_option(command, arguments->mount, "Publish on /tf_static");
-  command.option("--base", arguments->base_frame, "The robot's frame there").with_default();
+  add_frame_option(command, "--base", arguments->base_frame, "The robot's frame there");
   add_client_options(command, arguments->client);
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(

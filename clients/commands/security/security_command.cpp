@@ -24,12 +24,23 @@ std::filesystem::path file_in(const std::filesystem::path& authority_folder) {
   return authority_folder / "authority" / "topics.json";
 }
 
+/// One topic as a text, as it was before there could be several.
+Json json_of_points(const std::vector<std::string>& points) {
+  return points.size() == 1 ? Json(points.front()) : Json(points);
+}
+
+/// Throws nlohmann's errors.
+std::vector<std::string> points_from(const nlohmann::json& json) {
+  if (json.is_string()) return {json.get<std::string>()};
+  return json.get<std::vector<std::string>>();
+}
+
 /// Saves the topic names of an authority's permissions beside its key, so that later identities get
 /// the same ones. Throws SecurityError when the file cannot be written.
 void save_topic_names(const dds::TopicNames& names, const std::filesystem::path& authority_folder) {
   const std::filesystem::path file = file_in(authority_folder);
   std::ofstream out(file);
-  out << Json{{"points", names.points},
+  out << Json{{"points", json_of_points(names.points)},
               {"odometry_prior", names.odometry_prior},
               {"imu", names.imu},
               {"gnss", names.gnss},
@@ -41,21 +52,28 @@ void save_topic_names(const dds::TopicNames& names, const std::filesystem::path&
   if (!out) throw dds::SecurityError(file.string() + " cannot be written");
 }
 
+dds::SecurityError unusable(const std::filesystem::path& file, const std::string& why) {
+  return dds::SecurityError(file.string() + " does not name the topics (" + why +
+                            "); restore it, or make a new authority");
+}
+
 /// Throws SecurityError for a file that is damaged or not there.
 dds::TopicNames load_topic_names(const std::filesystem::path& authority_folder) {
   const std::filesystem::path file = file_in(authority_folder);
   std::ifstream in(file);
   try {
     const auto json = nlohmann::json::parse(in);
-    return {.points = json.at("points"),
-            .odometry_prior = json.at("odometry_prior"),
-            .imu = json.value("imu", std::string()),
-            .gnss = json.value("gnss", std::string()),
-            .initial_pose = json.value("initial_pose", std::string()),
-            .name_space = json.at("namespace")};
+    dds::TopicNames names{.points = points_from(json.at("points")),
+                          .odometry_prior = json.at("odometry_prior"),
+                          .imu = json.value("imu", std::string()),
+                          .gnss = json.value("gnss", std::string()),
+                          .initial_pose = json.value("initial_pose", std::string()),
+                          .name_space = json.at("namespace")};
+    const std::string fault = topic_list_fault(names.points);
+    if (!fault.empty()) throw unusable(file, "'points' " + fault);
+    return names;
   } catch (const nlohmann::json::exception& error) {
-    throw dds::SecurityError(file.string() + " does not name the topics (" + error.what() +
-                             "); restore it, or make a new authority");
+    throw unusable(file, error.what());
   }
 }
 
@@ -85,6 +103,8 @@ class UnfinishedFolders {
 };
 
 ExitCode run(const InitArguments& arguments) {
+  const std::string fault = topic_list_fault(arguments.names.points);
+  if (!fault.empty()) throw std::invalid_argument("--points " + fault);
   UnfinishedFolders unfinished;
   if (!std::filesystem::exists(arguments.folder)) unfinished.add(arguments.folder);
   const dds::Authority authority = dds::Authority::make(arguments.folder, arguments.authority_days);
@@ -211,7 +231,9 @@ void add_security_init_command(CommandHandle security, Action& action) {
   CommandHandle command = security.command(
       "init", "Make an authority, and identities for server, sensor, planner and operator");
   command.option("FOLDER", arguments->folder, "Where to; must not have an authority").required();
-  command.option("--points", arguments->names.points, "The sensor's topic")
+  command
+      .option("--points", arguments->names.points,
+              "The sensor's topic; of several lidars, each one's")
       .corrected(to_topic_name)
       .with_default();
   command
@@ -240,8 +262,9 @@ void add_security_init_command(CommandHandle security, Action& action) {
       .between(1, 36500)
       .with_default();
   command.explain(
-      "Example:\n"
+      "Examples:\n"
       "  stillmap security init keys\n"
+      "  stillmap security init keys --points front/points rear/points     # several lidars\n"
       "Topic names are part of the permissions: give those of the server's configuration.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
