@@ -203,7 +203,7 @@ class Client {
 
   /// Where the server's last scan is in its map; a place that was not found is an answer, too. With
   /// `apply` the server goes on there once the scans that follow confirm it; otherwise nothing
-  /// changes.
+  /// changes. Throws std::invalid_argument for a guess whose radius or turn is not above 0.
   [[nodiscard]] LocalizationAnswer localize(const LocalizationQuestion& question = {});
 
   /// Has the server save its map; returns the file's name on the server's machine. An empty name

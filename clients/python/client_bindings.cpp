@@ -266,7 +266,9 @@ void bind_place_requests(py::class_<Client>& client) {
            "Where the server's last scan is in its map: outcome ('found', 'ambiguous', "
            "'not_found', 'no_evidence'), T_map_base (4, 4; None unless found), stamp_ns, score, "
            "runner_up_score, applied. near: x, y [m] and heading [rad] in the map frame; None: "
-           "anywhere. apply: the server goes on there once the next scans confirm it.");
+           "anywhere. radius_m, max_turn_rad: how far it is from there at most, and how far it is "
+           "turned; above 0, else ValueError. apply: the server goes on there once the next scans "
+           "confirm it.");
 }
 
 void bind_map_requests(py::class_<Client>& client) {

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <mutex>
+#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -54,6 +55,8 @@ std::unique_ptr<SharedMapper> make_mapper(const SensorModel& sensor, const std::
   const py::gil_scoped_release released;
   ServerConfig config;
   if (config_file) config = load_server_config(*config_file);
+  if (const auto fault = range_fault(sensor, config.automatic_sensor, config.mapper.prepare))
+    throw std::invalid_argument("prepare." + fault->field + ": " + fault->text);
   use_sensor(sensor, config.automatic_sensor, config.mapper);
   auto mapper = std::make_unique<Mapper>(
       config.mapper, open_segmenter(labels_from(config.labels, labels), sensor));

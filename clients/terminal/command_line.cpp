@@ -4,9 +4,12 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <CLI/TypeTools.hpp>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <sstream>
+#include <string>
+#include <vector>
 
 namespace stillmap::cli {
 namespace {
@@ -29,6 +32,18 @@ std::string fault_of_unsigned(const std::string& word) {
   const std::size_t first = word.find_first_not_of(" \t\n\v\f\r");
   if (first == std::string::npos || word[first] != '-') return {};
   return "'" + word + "' is negative; it must be a whole number of 0 or more";
+}
+
+/// CLI11 takes what begins with '-' and no digit for an option, numbers such as -inf and -.5, too.
+/// After a blank they are values, and the same numbers.
+std::string marked_number(const std::string& word) {
+  const bool looks_like_option =
+      word.size() > 1 && word[0] == '-' && std::isdigit(static_cast<unsigned char>(word[1])) == 0;
+  double number = 0.0;
+  // The first one of a list with commas.
+  const bool is_number =
+      looks_like_option && CLI::detail::lexical_cast(word.substr(0, word.find(',')), number);
+  return is_number ? " " + word : word;
 }
 
 }  // namespace
@@ -182,8 +197,15 @@ CommandLine::~CommandLine() = default;
 CommandHandle CommandLine::root() { return CommandHandle(*app_); }
 
 CommandLine::Parsed CommandLine::parse(int argc, char** argv) {
+  std::vector<std::string> words(argv, argv + argc);
+  for (std::size_t i = 1; i < words.size() && words[i] != "--"; ++i) {
+    words[i] = marked_number(words[i]);
+  }
+  std::vector<const char*> marked;
+  marked.reserve(words.size());
+  for (const std::string& word : words) marked.push_back(word.c_str());
   try {
-    app_->parse(argc, argv);
+    app_->parse(argc, marked.data());
     return Parsed::command;
   } catch (const CLI::ParseError& error) {
     // Help and version arrive as errors, too, with code 0.

@@ -1,8 +1,11 @@
 #include "config/loaders/server_config.hpp"
 
+#include <yaml-cpp/yaml.h>
+
 #include <algorithm>
 #include <cctype>
 #include <numbers>
+#include <sstream>
 #include <stdexcept>
 
 #include "config/loaders/listening_address.hpp"
@@ -72,6 +75,12 @@ void read_labels(YamlSection section, LabelsConfig& labels) {
   section.integer("budget_ms", labels.budget_ms, {0, 60'000});
 }
 
+void check_frame(YamlSection& section, const std::string& field, const std::string& frame) {
+  if (!frame.starts_with('/')) return;
+  section.fault(
+      field, "'" + frame + "' begins with '/', and tf2 looks up no such frame; leave the '/' away");
+}
+
 void read_frames(YamlSection section, FramesConfig& frames) {
   section.text("map", frames.map);
   section.text("odom", frames.odom);
@@ -80,6 +89,10 @@ void read_frames(YamlSection section, FramesConfig& frames) {
                              {{"own", OdomSource::own}, {"prior", OdomSource::prior}});
   section.text("base", frames.base);
   section.text("lidar", frames.lidar);
+  check_frame(section, "map", frames.map);
+  check_frame(section, "odom", frames.odom);
+  check_frame(section, "base", frames.base);
+  check_frame(section, "lidar", frames.lidar);
   if (frames.map.empty()) section.fault("map", "is empty; a frame needs a name");
   if (!frames.odom.empty() && frames.base.empty()) {
     section.fault("odom", "needs the robot's frame beneath it: set frames.base, as base_link");
@@ -306,6 +319,7 @@ LidarConfig read_lidar(YamlSection& section, const fs::path& folder) {
   }
   section.text("topic", lidar.topic);
   section.text("frame", lidar.frame);
+  check_frame(section, "frame", lidar.frame);
   lidar.T_base_lidar = read_extrinsic(section);
   // In counters, whose names are metrics' labels.
   const bool is_word = std::ranges::all_of(
@@ -439,17 +453,40 @@ ServerConfig load_server_config(const fs::path& file, ConfigReport& report) {
   ServerConfig config;
   read_server(YamlSection(yaml), file.parent_path(), config);
   yaml.require_no_faults();
+  const SensorModel sensor = config.mapper.sensor;
+  AutomaticSensor& automatic = config.automatic_sensor;
+  automatic.sets_min_range = is_left_out(yaml.report, "prepare.min_range_m");
+  automatic.sets_max_range = is_left_out(yaml.report, "prepare.max_range_m");
+  if (const auto fault = range_fault(sensor, automatic, config.mapper.prepare)) {
+    yaml.fault(yaml.root["prepare"][fault->field], "prepare." + fault->field, fault->text);
+    yaml.require_no_faults();
+  }
   report = std::move(yaml.report);
-  config.automatic_sensor.sets_min_range = is_left_out(report, "prepare.min_range_m");
-  config.automatic_sensor.sets_max_range = is_left_out(report, "prepare.max_range_m");
-  use_sensor(SensorModel(config.mapper.sensor), config.automatic_sensor, config.mapper);
+  use_sensor(sensor, automatic, config.mapper);
   return config;
+}
+
+std::optional<RangeFault> range_fault(const SensorModel& sensor, const AutomaticSensor& automatic,
+                                      const PrepareConfig& prepare) {
+  // Where the file says both, they were compared as it was read.
+  if (automatic.sets_min_range == automatic.sets_max_range) return std::nullopt;
+  const bool is_min = automatic.sets_max_range;
+  const bool fits =
+      is_min ? prepare.min_range_m < sensor.max_range_m : prepare.max_range_m > sensor.min_range_m;
+  if (fits) return std::nullopt;
+  std::ostringstream text;
+  text << "is " << (is_min ? prepare.min_range_m : prepare.max_range_m) << " m, and the lidar '"
+       << sensor.name << "' measures from " << sensor.min_range_m << " m to " << sensor.max_range_m
+       << " m: no point would be left; " << (is_min ? "lower" : "raise") << " it, or set prepare."
+       << (is_min ? "max_range_m" : "min_range_m") << ", too";
+  return RangeFault{is_min ? "min_range_m" : "max_range_m", text.str()};
 }
 
 void use_sensor(const SensorModel& sensor, const AutomaticSensor& automatic, MapperConfig& mapper) {
   mapper.sensor = sensor;
-  if (automatic.sets_min_range) mapper.prepare.min_range_m = sensor.min_range_m;
-  if (automatic.sets_max_range) mapper.prepare.max_range_m = sensor.max_range_m;
+  const bool fits = !range_fault(sensor, automatic, mapper.prepare);
+  if (automatic.sets_min_range || !fits) mapper.prepare.min_range_m = sensor.min_range_m;
+  if (automatic.sets_max_range || !fits) mapper.prepare.max_range_m = sensor.max_range_m;
 }
 
 }  // namespace stillmap

@@ -252,12 +252,25 @@ struct ServerConfig {
   MetricsConfig metrics;
 };
 
-/// Has the mapper work for a lidar that its scans have told.
+/// A range of `prepare` that leaves no point of a lidar.
+struct RangeFault {
+  /// "min_range_m", and what is wrong with it.
+  std::string field;
+  std::string text;
+};
+
+/// Where the file says one range and the lidar the other, they may leave nothing between them.
+[[nodiscard]] std::optional<RangeFault> range_fault(const SensorModel& sensor,
+                                                    const AutomaticSensor& automatic,
+                                                    const PrepareConfig& prepare);
+
+/// Has the mapper work for a lidar that its scans have told. Where range_fault() finds one, both
+/// ranges are the lidar's.
 void use_sensor(const SensorModel& sensor, const AutomaticSensor& automatic, MapperConfig& mapper);
 
 /// Reads a server file (config/server/default.yaml shows every field). What the file leaves out
 /// keeps its default; relative paths start at the file's folder. Throws ConfigError with every
-/// fault at once; a name that is not known is a fault.
+/// fault at once; a name that is not known is a fault, and so is a range_fault().
 [[nodiscard]] ServerConfig load_server_config(const std::filesystem::path& file);
 /// The same, and tells which fields the file leaves out and which it changes.
 [[nodiscard]] ServerConfig load_server_config(const std::filesystem::path& file,

@@ -52,6 +52,9 @@ Localize_Request to_request(const LocalizationQuestion& question) {
   request.apply(question.apply);
   if (!question.guess) return request;
   const PlaceGuess& guess = *question.guess;
+  // On the wire 0 means that there is no guess, and any turn.
+  require(guess.radius_m > 0.0, "radius_m", guess.radius_m, "above 0");
+  require(guess.max_turn_rad > 0.0, "max_turn_rad", guess.max_turn_rad, "above 0");
   request.x(guess.T_map_base.translation().x());
   request.y(guess.T_map_base.translation().y());
   request.heading_rad(heading_rad(guess.T_map_base));

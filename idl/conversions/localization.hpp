@@ -43,6 +43,7 @@ struct LocalizationAnswer {
 
 namespace wire {
 
+/// Throws std::invalid_argument where the guess has a radius or a turn that is not above 0.
 [[nodiscard]] stillmap_msgs::srv::Localize_Request to_request(const LocalizationQuestion& question);
 /// Throws std::invalid_argument that names the field which makes no sense.
 [[nodiscard]] LocalizationQuestion from_request(

@@ -59,6 +59,9 @@ void MapperFactory::tell_of_better_model(const SensorModel& sensor) const {
 
 Mapper MapperFactory::make_for(const SensorModel& sensor, MapperListeners listeners) const {
   MapperConfig mapper = mapper_;
+  if (const auto fault = range_fault(sensor, automatic_, mapper.prepare))
+    spdlog::warn("prepare.{} {}; until then both ranges are the lidar's", fault->field,
+                 fault->text);
   use_sensor(sensor, automatic_, mapper);
   std::unique_ptr<Segmenter> segmenter;
   try {

@@ -205,5 +205,15 @@ TEST_F(MapToolsTest, ADatumIsOfAGeoTiff) {
   EXPECT_THAT(nowhere.err, HasSubstr("here"));
 }
 
+TEST_F(MapToolsTest, RegionsMayBeInfiniteOnEitherSide) {
+  save_street("street.stillmap", true);
+  const std::string command = "map-export " + path("street.stillmap") + " --output ";
+  EXPECT_EQ(json_of(command + path("all.ply") + " --box -inf -inf -inf inf inf inf").at("voxels"),
+            400);
+  const std::string half = command + path("half.ply");
+  EXPECT_EQ(json_of(half + " --box 0 -Infinity -.9e1 inf INF inf").at("voxels"), 200);
+  EXPECT_EQ(json_of(command + path("low.ply") + " --min-z -inf --max-z 1").at("voxels"), 200);
+}
+
 }  // namespace
 }  // namespace stillmap::test

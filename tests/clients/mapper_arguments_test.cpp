@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <stdexcept>
+
 #include "config/loaders/sensor_file.hpp"
 #include "tests/config/config_files.hpp"
 
@@ -42,6 +44,14 @@ TEST(MapperArguments, RangesOfAServerFileCountMore) {
   const MapperConfig config = mapper_config(arguments, far_sighted());
   EXPECT_EQ(config.prepare.min_range_m, 2.0);
   EXPECT_EQ(config.prepare.max_range_m, 30.0);
+}
+
+TEST(MapperArguments, ARangeThatLeavesNoPointOfTheRecordingsSensorIsRefused) {
+  MapperArguments arguments;
+  arguments.config_file = test::write_file("blind.yaml", "prepare: {min_range_m: 80}\n").string();
+  EXPECT_THROW((void)mapper_config(arguments, far_sighted()), std::invalid_argument);
+  arguments.sensor = "hdl_64e";
+  EXPECT_EQ(mapper_config(arguments, far_sighted()).prepare.min_range_m, 80.0);
 }
 
 }  // namespace

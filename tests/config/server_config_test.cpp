@@ -318,5 +318,41 @@ TEST(ServerConfig, ShowsTheFaultsOfASensorFile) {
               AllOf(HasSubstr("broken.yaml:1: rings"), HasSubstr("below fov_up")));
 }
 
+TEST(ServerConfig, RefusesARangeThatLeavesNoPointOfTheSensor) {
+  EXPECT_THAT(refusal_of("sensor: vlp_16\nprepare:\n  min_range_m: 110\n"),
+              AllOf(HasSubstr("server.yaml:3: prepare.min_range_m: is 110 m"),
+                    HasSubstr("'VLP-16' measures from 0.5 m to 100 m"),
+                    HasSubstr("lower it, or set prepare.max_range_m, too")));
+  (void)write_file("far.yaml",
+                   "{name: far, rings: 8, fov_up_deg: 10, fov_down_deg: -10, min_range_m: 5, "
+                   "max_range_m: 300}");
+  EXPECT_THAT(refusal_of("sensor: far.yaml\nprepare: {max_range_m: 4}"),
+              AllOf(HasSubstr("prepare.max_range_m: is 4 m"), HasSubstr("from 5 m to 300 m"),
+                    HasSubstr("raise it, or set prepare.min_range_m, too")));
+  EXPECT_EQ(refusal_of("sensor: vlp_16\nprepare: {min_range_m: 110, max_range_m: 150}"), "");
+}
+
+TEST(ServerConfig, ALidarThatWasToldKeepsItsRangesWhereTheFileLeavesNoPointOfIt) {
+  ServerConfig config = load("prepare: {min_range_m: 110}\n");
+  const SensorModel told = vlp_16();
+  ASSERT_TRUE(range_fault(told, config.automatic_sensor, config.mapper.prepare));
+  use_sensor(told, config.automatic_sensor, config.mapper);
+  EXPECT_EQ(config.mapper.prepare.min_range_m, told.min_range_m);
+  EXPECT_EQ(config.mapper.prepare.max_range_m, told.max_range_m);
+}
+
+TEST(ServerConfig, RefusesFramesThatBeginWithASlash) {
+  for (const char* field : {"map", "odom", "base", "lidar"}) {
+    const std::string frames = "frames: {base: b, " + std::string(field) + ": /robot}";
+    EXPECT_THAT(
+        refusal_of(std::string(field) == "base" ? "frames: {base: /robot}" : frames),
+        AllOf(HasSubstr("frames." + std::string(field) + ": '/robot'"), HasSubstr("leave the '/'")))
+        << field;
+  }
+  EXPECT_THAT(refusal_of("frames: {base: base_link}\n"
+                         "sensors: [{name: a, sensor: vlp_16, topic: b, frame: /velodyne}]\n"),
+              HasSubstr("sensors[0].frame: '/velodyne' begins with '/'"));
+}
+
 }  // namespace
 }  // namespace stillmap

@@ -131,5 +131,23 @@ TEST(InitialPoseFromTheWire, SaysWhatIsWrong) {
   refused([](auto& pose) { pose.covariance()[35] = -1.0; });
 }
 
+TEST(LocalizationOnTheWire, AGuessOfNoRadiusOrNoTurnIsNotSent) {
+  const auto fault_of_guess = [](double radius_m, double max_turn_rad) -> std::string {
+    try {
+      const PlaceGuess guess{
+          .T_map_base = level_pose(), .radius_m = radius_m, .max_turn_rad = max_turn_rad};
+      static_cast<void>(to_request(LocalizationQuestion{.guess = guess}));
+      return {};
+    } catch (const std::invalid_argument& fault) {
+      return fault.what();
+    }
+  };
+  for (const double none : {0.0, -1.0, nan}) {
+    EXPECT_TRUE(fault_of_guess(none, 0.5).starts_with("radius_m is")) << none;
+    EXPECT_TRUE(fault_of_guess(3.0, none).starts_with("max_turn_rad is")) << none;
+  }
+  EXPECT_EQ(fault_of_guess(3.0, 0.5), "");
+}
+
 }  // namespace
 }  // namespace stillmap::wire

@@ -66,8 +66,15 @@ def test_the_robot_is_found_where_it_is(client):
     assert found.outcome == "found" and not found.applied
     here = pose_at(client, found.stamp_ns)
     np.testing.assert_allclose(found.T_map_base[:2, 3], here[:2, 3], atol=0.5)
-    with pytest.raises(stillmap.ServiceError, match="radius"):
-        client.localize(near=(0.0, 0.0, 0.0), radius_m=-1.0)
+    with pytest.raises(stillmap.ServiceError, match="radius_m is 20000"):
+        client.localize(near=(0.0, 0.0, 0.0), radius_m=20_000.0)
+    # 0 would have the whole map searched, and every heading.
+    for radius_m in (0.0, -1.0, float("nan")):
+        with pytest.raises(ValueError, match="radius_m"):
+            client.localize(near=(0.0, 0.0, 0.0), radius_m=radius_m)
+    for max_turn_rad in (0.0, -0.1, float("nan")):
+        with pytest.raises(ValueError, match="max_turn_rad"):
+            client.localize(near=(0.0, 0.0, 0.0), max_turn_rad=max_turn_rad)
 
 
 def test_traversability_is_that_of_the_servers_map(client):

@@ -82,15 +82,28 @@ Weighting weighting_from_name(const std::string& weighting_name) {
                               "' is not known; there are none, geometric and semantic");
 }
 
+namespace {
+
+/// The sensor is not that of the file, whose ranges may leave no point of it.
+void use_other_sensor(const SensorModel& sensor, const std::string& config_file,
+                      ServerConfig& server) {
+  if (const auto fault = range_fault(sensor, server.automatic_sensor, server.mapper.prepare)) {
+    throw std::invalid_argument(config_file + ": prepare." + fault->field + ": " + fault->text);
+  }
+  use_sensor(sensor, server.automatic_sensor, server.mapper);
+}
+
+}  // namespace
+
 MapperConfig mapper_config(const MapperArguments& arguments, const SensorModel& suggested_sensor) {
   ServerConfig server;
   if (!arguments.config_file.empty()) server = load_server_config(arguments.config_file);
-  MapperConfig& config = server.mapper;
   if (!arguments.sensor.empty()) {
-    use_sensor(load_sensor(arguments.sensor), server.automatic_sensor, config);
+    use_other_sensor(load_sensor(arguments.sensor), arguments.config_file, server);
   } else if (server.automatic_sensor.is_on) {
-    use_sensor(suggested_sensor, server.automatic_sensor, config);
+    use_other_sensor(suggested_sensor, arguments.config_file, server);
   }
+  MapperConfig& config = server.mapper;
   if (!arguments.weighting.empty()) {
     config.odometry.weighting = weighting_from_name(arguments.weighting);
   }

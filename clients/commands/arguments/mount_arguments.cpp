@@ -9,6 +9,16 @@
 #include "core/frames/rigid_motion.hpp"
 
 namespace stillmap::cli {
+namespace {
+
+std::string to_frame_name(std::string& frame) {
+  const std::string given = frame;
+  if (frame.starts_with('/')) frame.erase(0, 1);
+  const bool is_name = frame.empty() ? given.empty() : frame.front() != '/';
+  return is_name ? "" : "'" + given + "' is no name of a frame; leave the '/' at its front away";
+}
+
+}  // namespace
 
 std::optional<Eigen::Isometry3d> MountArguments::T_base_lidar() const {
   if (xyz_rpy.empty()) return std::nullopt;
@@ -48,6 +58,11 @@ void add_mount_option(CommandHandle command, MountArguments& arguments, const st
               help + ": x,y,z [m],roll,pitch,yaw [deg] of the lidar on the robot, as in a URDF")
       .exactly(6)
       .comma_separated();
+}
+
+void add_frame_option(CommandHandle command, const std::string& option, std::string& frame,
+                      const std::string& help) {
+  command.option(option, frame, help).corrected(to_frame_name).with_default();
 }
 
 }  // namespace stillmap::cli

@@ -33,4 +33,9 @@ struct MappedBody {
 /// Adds --mount; `help` says what it is for.
 void add_mount_option(CommandHandle command, MountArguments& arguments, const std::string& help);
 
+/// Adds an option for the name of a frame. A '/' at its front, with which tf2 looks up none, is
+/// taken away.
+void add_frame_option(CommandHandle command, const std::string& option, std::string& frame,
+                      const std::string& help);
+
 }  // namespace stillmap::cli

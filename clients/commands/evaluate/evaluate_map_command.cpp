@@ -7,6 +7,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/scan_dataset.hpp"
@@ -141,6 +142,7 @@ std::string describe(const evaluation::MapCleaningScore& score) {
 }
 
 ExitCode run(const EvaluateMapArguments& arguments) {
+  end_cleanly_when_stopped();
   if (!std::filesystem::exists(arguments.map)) {
     throw DatasetError(arguments.map, "does not exist; 'stillmap map' writes map files");
   }

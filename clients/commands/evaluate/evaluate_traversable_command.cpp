@@ -6,6 +6,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/evaluate/traversability_truth.hpp"
 #include "clients/terminal/json.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "config/loaders/robot_profile.hpp"
 #include "core/dataset/dataset_error.hpp"
@@ -70,6 +71,7 @@ std::string describe(const evaluation::TraversabilityScore& score, double cell_m
 }
 
 ExitCode run(const EvaluateTraversableArguments& arguments) {
+  end_cleanly_when_stopped();
   const RobotProfile profile = load_robot_profile(arguments.profile);
   if (!std::filesystem::exists(arguments.map)) {
     throw DatasetError(arguments.map, "does not exist; 'stillmap map' writes map files");

@@ -10,6 +10,7 @@
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/terminal/json.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/occupancy/occupancy_map.hpp"
@@ -251,6 +252,7 @@ class OccupancySource {
 };
 
 ExitCode run(const OctomapArguments& arguments) {
+  end_cleanly_when_stopped();
   const OccupancyQuery query = query_of(arguments);
   const bool asks =
       !arguments.points.empty() || !arguments.boxes.empty() || !arguments.rays.empty();

@@ -10,6 +10,7 @@
 #include "clients/commands/query/fetch_map.hpp"
 #include "clients/commands/query/region_arguments.hpp"
 #include "clients/terminal/json.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "core/map/query/region.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/picture/map_change_picture.hpp"
@@ -128,6 +129,7 @@ ExitCode restore(Client& client, const RemovedArguments& arguments) {
 }
 
 ExitCode run(const RemovedArguments& arguments) {
+  end_cleanly_when_stopped();
   check_region(arguments.region);
   if (!arguments.restore.empty()) check_restore(arguments);
   std::optional<Client> client;

@@ -6,6 +6,7 @@
 #include "clients/commands/query/region_arguments.hpp"
 #include "clients/commands/traversability/traversability_source.hpp"
 #include "clients/terminal/json.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 
 namespace stillmap::cli {
@@ -71,6 +72,7 @@ struct CheckPathArguments {
 };
 
 ExitCode run(const CheckPathArguments& arguments) {
+  end_cleanly_when_stopped();
   PathQuery query;
   query.positions_map = parse_points_2d("--path", arguments.path);
   query.headings_rad = arguments.headings_rad;

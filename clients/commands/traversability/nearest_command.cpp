@@ -4,6 +4,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/traversability/traversability_source.hpp"
 #include "clients/terminal/json.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 
 namespace stillmap::cli {
@@ -42,6 +43,7 @@ struct NearestArguments {
 };
 
 ExitCode run(const NearestArguments& arguments) {
+  end_cleanly_when_stopped();
   const std::unique_ptr<TraversabilitySource> source = open_traversability_source(arguments.source);
   const NearestTraversable nearest = source->nearest(
       {arguments.position_map[0], arguments.position_map[1]}, arguments.max_distance_m);

@@ -11,6 +11,7 @@
 #include "clients/commands/query/region_arguments.hpp"
 #include "clients/commands/traversability/traversability_source.hpp"
 #include "clients/terminal/json.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/picture/traversability_picture.hpp"
 #include "core/traversability/nav2_map.hpp"
@@ -151,6 +152,7 @@ void draw(const std::string& file, const TraversabilityView& view, Traversabilit
 }
 
 ExitCode run(const TraversableArguments& arguments) {
+  end_cleanly_when_stopped();
   check_region(arguments.region);
   const auto began = std::chrono::steady_clock::now();
   const std::unique_ptr<TraversabilitySource> source = open_traversability_source(arguments.source);
