@@ -98,7 +98,7 @@ image: ## Docker image stillmap, from source
 	docker/build_image.sh stillmap --build-arg JOBS=$(JOBS)
 
 test-docker: ## Docker: the image, and the deployments of docker/ end to end (root where no dockerd runs)
-	docker/test.sh
+	JOBS=$(JOBS) docker/test.sh
 
 fuzz: ## Fuzz all that takes bytes from outside, FUZZ_SECONDS=600 each, FUZZ_JOBS=2 at a time (needs clang)
 	@JOBS=$(FUZZ_JOBS) tests/fuzz/fuzz.sh $(FUZZ_SECONDS)
@@ -150,10 +150,10 @@ tidy: programs ## clang-tidy over the sources changed since BASE (the commit bef
 	@BUILD=$(BUILD) BASE=$(BASE) FILES="$(FILES)" tests/tidy.sh
 
 format: ## Format the code
-	git ls-files '*.cpp' '*.hpp' | xargs clang-format -i
+	set -o pipefail; git ls-files '*.cpp' '*.hpp' | xargs -r clang-format -i
 
 format-check: ## Fail if the code is not formatted
-	git ls-files '*.cpp' '*.hpp' | xargs clang-format --dry-run -Werror
+	set -o pipefail; git ls-files '*.cpp' '*.hpp' | xargs -r clang-format --dry-run -Werror
 
 clean: ## Remove what was built and demonstrated
 	rm -rf build demo

@@ -99,7 +99,7 @@ build_image() {
   fi
   # The host's network: a mirror that only the host reaches is reached.
   DOCKER=$docker docker/build_image.sh "$STILLMAP_IMAGE" -q --network host --build-arg PACKAGES=$from \
-    --build-arg JOBS="$(nproc)" > /dev/null || fail "the image does not build"
+    --build-arg JOBS="${JOBS:-$(nproc)}" > /dev/null || fail "the image does not build"
 }
 
 in_image() { "$docker" run --rm --network none "$STILLMAP_IMAGE" "$@"; }

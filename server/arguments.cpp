@@ -4,6 +4,7 @@
 #include <chrono>
 #include <iostream>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "config/loaders/listening_address.hpp"
@@ -29,6 +30,27 @@ constexpr const char* footer =
 
 constexpr int bad_usage = 2;
 
+/// One of a few words; `variable` may give it, too.
+template <typename T>
+CLI::Option* add_choice(CLI::App& program, const std::string& name, std::optional<T>& value,
+                        const std::map<std::string, T>& choices, const std::string& help,
+                        const std::string& variable = "") {
+  std::string words;
+  for (const auto& choice : choices) words += (words.empty() ? "" : "|") + choice.first;
+  const auto choose = [=, &value](const std::string& word) {
+    const auto found = choices.find(word);
+    if (found != choices.end()) {
+      value = found->second;
+      return;
+    }
+    throw CLI::ValidationError(name + (variable.empty() ? "" : " or " + variable),
+                               "'" + word + "' is none of " + words);
+  };
+  return program.add_option_function<std::string>(name, choose, help)
+      ->option_text(words)
+      ->envname(variable);
+}
+
 /// Options for logs and metrics, which override the configuration file.
 struct OperationArguments {
   std::optional<LogLevel> log_level;
@@ -41,16 +63,12 @@ struct OperationArguments {
 };
 
 void add_operation_options(CLI::App& program, OperationArguments& operation) {
-  const std::map<std::string, LogLevel> levels{{"debug", LogLevel::debug},
-                                               {"info", LogLevel::info},
-                                               {"warning", LogLevel::warning},
-                                               {"error", LogLevel::error}};
-  program
-      .add_option("--log-level", operation.log_level,
-                  "Least important lines to log, instead of the file's")
-      ->option_text("debug|info|warning|error")
-      ->envname("STILLMAP_LOG_LEVEL")
-      ->transform(CLI::CheckedTransformer(levels));
+  add_choice<LogLevel>(program, "--log-level", operation.log_level,
+                       {{"debug", LogLevel::debug},
+                        {"info", LogLevel::info},
+                        {"warning", LogLevel::warning},
+                        {"error", LogLevel::error}},
+                       "Least important lines to log, instead of the file's", "STILLMAP_LOG_LEVEL");
   program
       .add_option("--metrics", operation.metrics_address,
                   "Where Prometheus finds the metrics, instead of the file's; 127.0.0.1:9464")
@@ -133,12 +151,9 @@ void add_server_options(CLI::App& program, ServerArguments& server) {
                   "Folder of the server's identity in a secured domain, instead of the file's")
       ->envname("STILLMAP_SECURITY");
   program.add_option("--map-file", server.map_file, "Where the map is kept, instead of the file's");
-  program
-      .add_option("--delivery", server.delivery,
-                  "latest: drop scans that are too many; every: let the sender wait")
-      ->option_text("latest|every")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, DeliveryMode>{
-          {"latest", DeliveryMode::latest}, {"every", DeliveryMode::every}}));
+  add_choice<DeliveryMode>(program, "--delivery", server.delivery,
+                           {{"latest", DeliveryMode::latest}, {"every", DeliveryMode::every}},
+                           "latest: drop scans that are too many; every: let the sender wait");
 }
 
 }  // namespace

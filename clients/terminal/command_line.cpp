@@ -4,11 +4,17 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <CLI/TypeTools.hpp>
+#include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <cstdlib>
+#include <iostream>
 #include <limits>
+#include <numeric>
+#include <span>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace stillmap::cli {
@@ -44,6 +50,90 @@ std::string marked_number(const std::string& word) {
   const bool is_number =
       looks_like_option && CLI::detail::lexical_cast(word.substr(0, word.find(',')), number);
   return is_number ? " " + word : word;
+}
+
+/// Letters to change, add or leave out between two words (Levenshtein).
+std::size_t edits_between(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = std::exchange(row[0], i + 1);
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t changed = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({changed, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+/// Empty where no name is near to the word.
+std::string nearest(const std::string& word, const std::vector<std::string>& names) {
+  std::size_t least = std::max<std::size_t>(1, word.size() / 3) + 1;
+  std::string found;
+  for (const std::string& name : names) {
+    const std::size_t edits = edits_between(word, name);
+    if (edits < least) {
+      least = edits;
+      found = name;
+    }
+  }
+  return found;
+}
+
+std::vector<std::string> command_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    names.push_back(command->get_name());
+  }
+  return names;
+}
+
+std::vector<std::string> option_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  return names;
+}
+
+/// The first command or option that does not exist but is written much as one that does: that one.
+std::string meant(const CLI::App& program, std::span<const std::string> words) {
+  const CLI::App* app = &program;
+  for (const std::string& word : words) {
+    if (word == "--") break;
+    if (word.starts_with("--")) {
+      const std::string name = word.substr(0, word.find('='));
+      if (app->get_option_no_throw(name) == nullptr) {
+        const std::string option = nearest(name, option_names(*app));
+        if (!option.empty()) return option;
+      }
+    } else if (const CLI::App* const command = app->get_subcommand_no_throw(word)) {
+      app = command;
+    } else if (app->get_require_subcommand_min() > 0) {
+      return nearest(word, command_names(*app));
+    }
+  }
+  return {};
+}
+
+/// A wrong value that nobody wrote: names the environment's variable that it came from.
+std::string of_environment(const CLI::App& app, const std::string& fault,
+                           std::span<const std::string> words) {
+  for (const CLI::Option* option : app.get_options()) {
+    const std::string& variable = option->get_envname();
+    const std::string name = option->get_name();
+    const bool is_written =
+        std::ranges::any_of(words, [&](const std::string& word) { return word.starts_with(name); });
+    if (variable.empty() || is_written || fault.find(name) == std::string::npos) continue;
+    if (const char* const value = std::getenv(variable.c_str())) {
+      return name + " is taken from the environment's " + variable + "=" + value;
+    }
+  }
+  for (const CLI::App* command : app.get_subcommands()) {
+    if (std::string text = of_environment(*command, fault, words); !text.empty()) return text;
+  }
+  return {};
 }
 
 }  // namespace
@@ -209,7 +299,13 @@ CommandLine::Parsed CommandLine::parse(int argc, char** argv) {
     return Parsed::command;
   } catch (const CLI::ParseError& error) {
     // Help and version arrive as errors, too, with code 0.
-    return app_->exit(error) == 0 ? Parsed::answered : Parsed::wrong_usage;
+    if (app_->exit(error) == 0) return Parsed::answered;
+    const std::span<const std::string> given = std::span(words).subspan(1);
+    const std::string name = meant(*app_, given);
+    if (!name.empty()) std::cerr << "Did you mean '" << name << "'?\n";
+    const std::string origin = of_environment(*app_, error.what(), given);
+    if (!origin.empty()) std::cerr << origin << "\n";
+    return Parsed::wrong_usage;
   }
 }
 

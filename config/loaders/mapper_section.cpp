@@ -31,13 +31,10 @@ void read_box(YamlSection& section, const std::string& name, Eigen::AlignedBox3d
 }
 
 void read_prepare(YamlSection section, PrepareConfig& prepare) {
-  section.number("min_range_m", prepare.min_range_m, {0, 1000});
-  section.number("max_range_m", prepare.max_range_m, {0.1, 10000});
+  section.number_or("sensor", "min_range_m", prepare.min_range_m, {0, 1000});
+  section.number_or("sensor", "max_range_m", prepare.max_range_m, {0.1, 10000});
   read_box(section, "ego_hull_lidar_m", prepare.ego_hull_lidar);
   section.boolean("compensate_motion", prepare.deskew);
-  if (!(prepare.min_range_m < prepare.max_range_m)) {
-    section.fault("max_range_m", "must be above min_range_m");
-  }
 }
 
 void read_features(YamlSection section, FeatureConfig& features) {

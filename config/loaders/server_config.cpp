@@ -455,9 +455,13 @@ ServerConfig load_server_config(const fs::path& file, ConfigReport& report) {
   yaml.require_no_faults();
   const SensorModel sensor = config.mapper.sensor;
   AutomaticSensor& automatic = config.automatic_sensor;
-  automatic.sets_min_range = is_left_out(yaml.report, "prepare.min_range_m");
-  automatic.sets_max_range = is_left_out(yaml.report, "prepare.max_range_m");
-  if (const auto fault = range_fault(sensor, automatic, config.mapper.prepare)) {
+  automatic.sets_min_range = is_left_open(yaml.report, "prepare.min_range_m");
+  automatic.sets_max_range = is_left_open(yaml.report, "prepare.max_range_m");
+  // A lidar that its scans tell is not known yet.
+  const bool both_are_known =
+      !automatic.is_on || (!automatic.sets_min_range && !automatic.sets_max_range);
+  const auto fault = range_fault(sensor, automatic, config.mapper.prepare);
+  if (fault && both_are_known) {
     yaml.fault(yaml.root["prepare"][fault->field], "prepare." + fault->field, fault->text);
     yaml.require_no_faults();
   }
@@ -468,8 +472,11 @@ ServerConfig load_server_config(const fs::path& file, ConfigReport& report) {
 
 std::optional<RangeFault> range_fault(const SensorModel& sensor, const AutomaticSensor& automatic,
                                       const PrepareConfig& prepare) {
-  // Where the file says both, they were compared as it was read.
-  if (automatic.sets_min_range == automatic.sets_max_range) return std::nullopt;
+  if (automatic.sets_min_range && automatic.sets_max_range) return std::nullopt;
+  if (!automatic.sets_min_range && !automatic.sets_max_range) {
+    if (prepare.min_range_m < prepare.max_range_m) return std::nullopt;
+    return RangeFault{"max_range_m", "must be above min_range_m"};
+  }
   const bool is_min = automatic.sets_max_range;
   const bool fits =
       is_min ? prepare.min_range_m < sensor.max_range_m : prepare.max_range_m > sensor.min_range_m;

@@ -259,7 +259,8 @@ struct RangeFault {
   std::string text;
 };
 
-/// Where the file says one range and the lidar the other, they may leave nothing between them.
+/// The ranges that the file says, and the lidar's where it says none, may leave nothing between
+/// them.
 [[nodiscard]] std::optional<RangeFault> range_fault(const SensorModel& sensor,
                                                     const AutomaticSensor& automatic,
                                                     const PrepareConfig& prepare);

@@ -144,6 +144,21 @@ std::string YamlSection::path_of(const std::string& name) const {
   return path_.empty() ? name : path_ + "." + name;
 }
 
+void YamlSection::number_or(const std::string& word, const std::string& name, double& value,
+                            Range allowed) {
+  const std::optional<YAML::Node> node = field(name);
+  if (!node) return;
+  const std::optional<double> read = number_in(*node, allowed);
+  if (read) {
+    assign(name, value, *read);
+  } else if (node->IsScalar() && node->Scalar() == word) {
+    file_.report.by_word.push_back(path_of(name));
+  } else {
+    fault(name,
+          shown(*node) + " is not allowed; '" + word + "', or a number from " + shown(allowed));
+  }
+}
+
 std::optional<double> YamlSection::read_number(const std::string& name, Range allowed) {
   const std::optional<YAML::Node> node = field(name);
   if (!node) return std::nullopt;

@@ -53,6 +53,8 @@ class YamlSection {
   void number(const std::string& name, T& value, Range allowed) {
     if (const auto read = read_number(name, allowed)) assign(name, value, static_cast<T>(*read));
   }
+  /// As number(); a file that says `word` keeps the default, and is_left_open().
+  void number_or(const std::string& word, const std::string& name, double& value, Range allowed);
   template <std::integral T>
   void integer(const std::string& name, T& value, Range allowed) {
     if (const auto read = read_integer(name, allowed)) assign(name, value, static_cast<T>(*read));

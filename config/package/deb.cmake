@@ -22,7 +22,7 @@ set(CPACK_DEBIAN_DATA_PACKAGE_NAME stillmap-data)
 set(CPACK_DEBIAN_DATA_PACKAGE_ARCHITECTURE all)
 set(CPACK_DEBIAN_DATA_PACKAGE_SHLIBDEPS OFF)
 set(CPACK_COMPONENT_DATA_DESCRIPTION
-  "Data: the default network, and descriptions of lidars, robots and networks, the ROS 2 package.")
+  "Data: two networks (street; kitti, CC BY-NC-SA 4.0), descriptions of lidars, robots and networks, the ROS 2 package.")
 
 set(CPACK_DEBIAN_SERVER_PACKAGE_NAME stillmap-server)
 set(CPACK_DEBIAN_SERVER_PACKAGE_DEPENDS "${same_version}")

@@ -32,9 +32,16 @@ foreach(page . core core/segmentation idl server clients clients/gateway config 
 endforeach()
 install(FILES ${PROJECT_SOURCE_DIR}/clients/demo_map.png ${PROJECT_SOURCE_DIR}/clients/demo_path.png
   DESTINATION share/doc/stillmap/clients COMPONENT tools)
+install(FILES ${PROJECT_SOURCE_DIR}/clients/gateway/lichtblick_layout.json
+  DESTINATION share/doc/stillmap/clients/gateway COMPONENT tools)
 install(FILES ${PROJECT_SOURCE_DIR}/clients/example/follow_and_query.cpp
   DESTINATION share/doc/stillmap/examples COMPONENT tools)
-foreach(package server:stillmap-server tools:stillmap data:stillmap-data)
+# The data have weights under a licence of their own.
+file(READ ${PROJECT_SOURCE_DIR}/LICENSE STILLMAP_LICENCE)
+configure_file(${CMAKE_CURRENT_LIST_DIR}/data_copyright.in ${PROJECT_BINARY_DIR}/data_copyright @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/data_copyright DESTINATION share/doc/stillmap-data RENAME copyright
+  COMPONENT data)
+foreach(package server:stillmap-server tools:stillmap)
   string(REPLACE ":" ";" package ${package})
   list(GET package 0 component)
   list(GET package 1 name)

@@ -28,6 +28,9 @@ Names inputs(const TopicNames& names) {
   return topics;
 }
 
+/// Where an operator wants the robot to go, as RViz2, Nav2 and the gateway name it: for planners.
+constexpr auto goal_topic = "rt/goal_pose";
+
 /// What an operator publishes, and the server reads.
 Names set_by_operators(const TopicNames& names) {
   return names.initial_pose.empty() ? Names{} : Names{"rt/" + names.initial_pose};
@@ -108,7 +111,11 @@ Access access_of(Role role, const TopicNames& names) {
       append(access.subscribe, outputs);
       append(access.subscribe, inputs(names));
       append(access.subscribe, set_by_operators(names));
-      if (role == Role::operator_of_server) append(access.publish, set_by_operators(names));
+      access.subscribe.emplace_back(goal_topic);
+      if (role == Role::operator_of_server) {
+        append(access.publish, set_by_operators(names));
+        access.publish.emplace_back(goal_topic);
+      }
       for_each_service([&](const auto& service) {
         const bool may_call =
             role == Role::operator_of_server || service.effect == ServiceEffect::reads;

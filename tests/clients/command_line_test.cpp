@@ -13,6 +13,8 @@ namespace stillmap::cli {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
@@ -46,6 +48,42 @@ TEST(CommandLine, OtherWordsWithAMinusStayOptions) {
     line.root().option("--box", box, "").exactly(2);
     EXPECT_EQ(parse(line, {"--box", "1", word}), CommandLine::Parsed::wrong_usage) << word;
   }
+}
+
+/// What is printed of wrong usage.
+std::string fault_of(const std::vector<std::string>& words) {
+  CommandLine line("program", "1", "help");
+  double scale = 1.0;
+  int domain = 0;
+  line.root().require_command();
+  CommandHandle map = line.root().command("map", "");
+  map.option("--scale", scale, "");
+  map.option("--domain", domain, "").from_environment("STILLMAP_TEST_DOMAIN").between(0, 10);
+  line.root().command("replay", "").command("again", "");
+  testing::internal::CaptureStderr();
+  const CommandLine::Parsed parsed = parse(line, words);
+  const std::string fault = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(parsed, CommandLine::Parsed::wrong_usage);
+  return fault;
+}
+
+TEST(CommandLine, NamesWhatWasMeant) {
+  EXPECT_THAT(fault_of({"mpa"}), HasSubstr("Did you mean 'map'?"));
+  EXPECT_THAT(fault_of({"replya", "x"}), HasSubstr("Did you mean 'replay'?"));
+  EXPECT_THAT(fault_of({"map", "--scael", "2"}), HasSubstr("Did you mean '--scale'?"));
+  EXPECT_THAT(fault_of({"map", "--scales=2"}), HasSubstr("Did you mean '--scale'?"));
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"segment"}, {}, {"map", "--width", "2"}, {"map", "x"}}) {
+    EXPECT_THAT(fault_of(words), Not(HasSubstr("Did you mean")));
+  }
+}
+
+TEST(CommandLine, NamesTheVariableThatAWrongValueCameFrom) {
+  ASSERT_EQ(setenv("STILLMAP_TEST_DOMAIN", "11", 1), 0);
+  EXPECT_THAT(fault_of({"map"}), HasSubstr("--domain is taken from the environment's "
+                                           "STILLMAP_TEST_DOMAIN=11"));
+  EXPECT_THAT(fault_of({"map", "--domain", "12"}), Not(HasSubstr("environment")));
+  unsetenv("STILLMAP_TEST_DOMAIN");
 }
 
 TEST(FrameOption, GoesWithoutItsFirstSlash) {

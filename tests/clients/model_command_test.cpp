@@ -78,7 +78,8 @@ TEST_F(ModelCommandTest, RunRefusesHalfAnImage) {
   const ProcessResult result = model("run " + path("model") + " --input " + path("image.f32") +
                                      " --output " + path("out.f32"));
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.err, HasSubstr("image.f32"));
+  EXPECT_THAT(result.err, AllOf(HasSubstr("image.f32"), HasSubstr("5 channels (range, x, y, z, "
+                                                                  "remission) x")));
 }
 
 TEST_F(ModelCommandTest, AgreeComparesTheEnginesOnARecording) {

@@ -332,6 +332,22 @@ TEST(ServerConfig, RefusesARangeThatLeavesNoPointOfTheSensor) {
   EXPECT_EQ(refusal_of("sensor: vlp_16\nprepare: {min_range_m: 110, max_range_m: 150}"), "");
 }
 
+TEST(ServerConfig, TakesTheSensorsRangesByTheirWord) {
+  const ServerConfig avia =
+      load("sensor: livox_avia\nprepare: {min_range_m: sensor, max_range_m: sensor}");
+  EXPECT_EQ(avia.mapper.prepare.min_range_m, 1.0);
+  EXPECT_EQ(avia.mapper.prepare.max_range_m, 200.0);
+  const ServerConfig far = load("sensor: livox_avia\nprepare: {min_range_m: 150}");
+  EXPECT_EQ(far.mapper.prepare.min_range_m, 150.0);
+  EXPECT_EQ(far.mapper.prepare.max_range_m, 200.0);
+  EXPECT_EQ(load("prepare: {min_range_m: 150}").mapper.prepare.min_range_m, 150.0);
+  EXPECT_THAT(refusal_of("prepare: {max_range_m: lidar}"),
+              AllOf(HasSubstr("prepare.max_range_m: 'lidar' is not allowed"),
+                    HasSubstr("'sensor', or a number from 0.1 to 10000")));
+  EXPECT_THAT(refusal_of("prepare: {min_range_m: 5, max_range_m: 4}"),
+              HasSubstr("prepare.max_range_m: must be above min_range_m"));
+}
+
 TEST(ServerConfig, ALidarThatWasToldKeepsItsRangesWhereTheFileLeavesNoPointOfIt) {
   ServerConfig config = load("prepare: {min_range_m: 110}\n");
   const SensorModel told = vlp_16();

@@ -30,6 +30,7 @@ fi
 run_target() {
   local target=$1 folder=$found/$1
   mkdir -p "$folder/inputs" "$folder/crashes" "$here/corpus/$target" "$here/crashes/$target"
+  rm -f "$folder/exit_code" "$folder/row"
   "$programs/fuzz_$target" --seeds "$folder/inputs" || return
   # Fast DDS 2.9 deletes one of its own classes by another one's size.
   ASAN_OPTIONS=new_delete_type_mismatch=0 UBSAN_OPTIONS=print_stacktrace=1 \

@@ -12,15 +12,24 @@ run(0 "" ${CMAKE_COMMAND} --install ${BUILD} --prefix ${PREFIX})
 foreach(file bin/stillmap bin/stillmap-server
         lib/systemd/system/stillmap-server.service etc/stillmap/server.yaml
         share/stillmap/models/street/model.onnx share/stillmap/models/kitti/model.onnx share/stillmap/server/default.yaml
-        share/stillmap/idl/stillmap_msgs.idl share/doc/stillmap/README.md
+        share/stillmap/idl/stillmap_msgs.idl share/doc/stillmap/README.md share/doc/stillmap/clients/gateway/lichtblick_layout.json
         share/doc/stillmap/examples/follow_and_query.cpp share/doc/stillmap-server/examples/secured.conf)
   if(NOT EXISTS ${PREFIX}/${file})
     message(FATAL_ERROR "${file} was not installed")
   endif()
 endforeach()
 
+# One network has a licence of its own.
+file(READ ${PREFIX}/share/doc/stillmap-data/copyright copyright)
+if(NOT copyright MATCHES "MIT License.*share/stillmap/models/kitti.*CC BY-NC-SA 4.0")
+  message(FATAL_ERROR "the data's copyright does not name both licences:\n${copyright}")
+endif()
+
 run(0 "stillmap-server [0-9.]+" ${PREFIX}/bin/stillmap-server --version)
 run(0 "can be used" ${PREFIX}/bin/stillmap-server --check-config ${PREFIX}/etc/stillmap/server.yaml)
+run(2 "--log-level or STILLMAP_LOG_LEVEL: 'loud' is none of debug.error.info.warning"
+  ${CMAKE_COMMAND} -E env STILLMAP_LOG_LEVEL=loud ${PREFIX}/bin/stillmap-server)
+run(2 "--delivery: 'some' is none of every.latest" ${PREFIX}/bin/stillmap-server --delivery some)
 
 # Only the installation has this robot.
 file(READ ${PREFIX}/share/stillmap/robots/car.yaml robot)

@@ -58,6 +58,9 @@ TEST(RolesTest, LetAPlannerReadEverythingAndChangeNothing) {
   EXPECT_FALSE(planner.may_publish("rt/lidar/points"));
   EXPECT_FALSE(boss.may_publish("rt/lidar/points"));
   EXPECT_FALSE(planner.may_publish("rt/set_pose"));
+  EXPECT_TRUE(boss.may_publish("rt/goal_pose"));
+  EXPECT_TRUE(planner.may_subscribe("rt/goal_pose"));
+  EXPECT_FALSE(planner.may_publish("rt/goal_pose"));
   EXPECT_TRUE(planner.may_subscribe("rt/set_pose"));
   EXPECT_TRUE(boss.may_publish("rt/set_pose"));
 }

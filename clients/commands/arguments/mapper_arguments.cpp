@@ -54,10 +54,12 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments) {
       "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: that of --config, else as the data "
       "set suggests");
   command
-      .option("--labels", arguments.labels,
-              "Where classes come from: auto (the data set's, if it has any, else the model's), "
-              "files (must have them), model (the one that comes with Stillmap), none (pure "
-              "geometry), or a folder with a model")
+      .option(
+          "--labels", arguments.labels,
+          "Where classes come from: auto (the data set's, if it has any, else the model's), "
+          "files (must have them), model (the default one that comes with Stillmap), none (pure "
+          "geometry), the name of one that comes with Stillmap (street, kitti), or a folder "
+          "with a model")
       .with_default();
   std::vector<std::string> weighting_names;
   weighting_names.reserve(named_weightings.size());

@@ -134,10 +134,10 @@ void add_dataset_export_command(CommandHandle dataset, Action& action) {
   CommandHandle command = dataset.command(
       "export", "Write a data set, a bag or a live topic as a SemanticKITTI sequence");
   command
-      .option(
-          "SOURCE", arguments->source,
-          "A KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, a ROS 2 bag "
-          "(folder or .db3), or topic:NAME of a sensor that a running stillmap-server listens to")
+      .option("SOURCE", arguments->source,
+              "A KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, a ROS 2 bag "
+              "(folder, .db3 or .mcap), or topic:NAME of a sensor that a running stillmap-server "
+              "listens to")
       .required();
   command.option("--topic-in", arguments->topic_in, topic_in_help);
   command.option("OUT", arguments->out, "New folder for the sequence").required();

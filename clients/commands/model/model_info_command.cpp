@@ -6,6 +6,7 @@
 #include "clients/commands/model/model_arguments.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/dataset/binary_file.hpp"
+#include "core/dataset/dataset_error.hpp"
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/onednn_network.hpp"
 
@@ -70,13 +71,25 @@ struct RunArguments {
   std::string input, output;
 };
 
+std::vector<float> read_images(const std::string& file, const ModelDescription& model) {
+  const std::uintmax_t bytes = scan_file_size(file);
+  const std::size_t bytes_an_image = model.input_size() * sizeof(float);
+  if (bytes > 0 && bytes % bytes_an_image == 0) return read_values<float>(file);
+  throw DatasetError(
+      file, "has " + std::to_string(bytes) + " bytes, and an image of '" + model.name + "' has " +
+                std::to_string(bytes_an_image) + ": " + std::to_string(model.statistics.channels) +
+                " channels (" + channels_in_words(model.statistics.channels) + ") x " +
+                std::to_string(model.rows) + " rows x " + std::to_string(model.columns) +
+                " columns of 32-bit floats; write whole images of that size");
+}
+
 ExitCode run(const RunArguments& arguments) {
   const ModelDescription model = load_model(arguments.model);
   EngineOptions choice;
   set_engine(arguments.engine, choice);
   const OpenedNetwork opened = open_network(model, choice);
   const std::size_t values_an_image = model.input_size();
-  const std::vector<float> images = read_values<float>(arguments.input, values_an_image);
+  const std::vector<float> images = read_images(arguments.input, model);
   std::vector<float> probabilities;
   for (std::size_t at = 0; at < images.size(); at += values_an_image) {
     const std::vector<float> of_image =
@@ -109,8 +122,9 @@ void add_model_run_command(CommandHandle model, Action& action) {
   add_model_options(command, arguments->model);
   add_engine_options(command, arguments->engine);
   command
-      .option("--input", arguments->input,
-              "Images, one after the other: 5 x rows x columns of 32-bit floats (little-endian)")
+      .option(
+          "--input", arguments->input,
+          "Images, one after the other: channels x rows x columns of 32-bit floats (little-endian)")
       .required();
   command
       .option("--output", arguments->output,
@@ -120,8 +134,9 @@ void add_model_run_command(CommandHandle model, Action& action) {
       "Example:\n"
       "  stillmap model run my_model --engine onednn --precision int8 --input x.f32 --output "
       "y.f32\n"
-      "Channels are range, x, y, z, remission, normalised as model.yaml says, 0 where a pixel is\n"
-      "empty. For comparing engines with the framework that trained the network.");
+      "Channels are those that 'stillmap model info' lists, normalised as model.yaml says, 0 where "
+      "a\n"
+      "pixel is empty. For comparing engines with the framework that trained the network.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

@@ -153,6 +153,7 @@ struct ModelSpeedArguments {
   std::vector<std::string> models;
   std::vector<std::string> columns{"1024"};
   std::string dataset;
+  std::string topic_in;
   std::uint32_t threads = 0;
   std::vector<std::string> beside;
   bool skip_opencv = false;
@@ -249,8 +250,9 @@ ExitCode run_beside_load(const ModelSpeedArguments& arguments, const Scan& scan)
 }
 
 ExitCode run(const ModelSpeedArguments& arguments) {
-  const Scan scan = arguments.dataset.empty() ? benchmark_scan()
-                                              : open_recording(arguments.dataset, {}).read(0).scan;
+  const Scan scan = arguments.dataset.empty()
+                        ? benchmark_scan()
+                        : open_recording(arguments.dataset, arguments.topic_in).read(0).scan;
   if (!arguments.beside.empty()) return run_beside_load(arguments, scan);
   Table table({"network", "image", "engine", "project ms", "network ms", "k-NN ms", "total ms",
                "Gop/s", "peak", "%", "MB"});
@@ -283,8 +285,10 @@ void add_model_speed_command(CommandHandle model, Action& action) {
   command.option("--columns", arguments->columns, "Columns of the image: 512,1024,2048")
       .comma_separated()
       .with_default();
-  command.option("--dataset", arguments->dataset,
-                 "Data set whose first scan is taken; default: one of 64 x 1900 made-up points");
+  const OptionHandle dataset = command.option(
+      "--dataset", arguments->dataset,
+      "Data set or bag whose first scan is taken; default: one of 64 x 1900 made-up points");
+  command.option("--topic-in", arguments->topic_in, topic_in_help).needs(dataset);
   command.option("--threads", arguments->threads, "Threads of oneDNN; default: all")
       .between(0, 1024);
   command

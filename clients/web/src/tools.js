@@ -148,7 +148,7 @@ export class Tools {
     lines.push(["good", `the server: free for ${this.state.profile}, clearance ${check.clearance.toFixed(1)} m`]);
     if (!isWanted()) return lines;
     this.state.publishGoal(goal);
-    lines.push("published as /goal_pose");
+    lines.push("sent to /goal_pose");
     return lines;
   }
 
