@@ -9,6 +9,7 @@
 #include "core/frames/rigid_motion.hpp"
 #include "core/lidar/rings.hpp"
 #include "core/map/voxel_grid.hpp"
+#include "core/odometry/unconfirmed_stretch.hpp"
 
 namespace stillmap {
 namespace {
@@ -358,6 +359,8 @@ void Mapper::confirm_relocation(OdometryResult& result) {
   }
   result.map_entry = MapEntry::stays_out_with_waiting;
   if (fits) result.health = OdometryHealth::degenerate;
+  // It looks as if it were known to centimetres, or it is in another place.
+  result.covariance = unknown_pose_covariance();
 }
 
 void Mapper::add_prior_map_near(const Eigen::Vector3d& position_map) {

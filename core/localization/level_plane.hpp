@@ -14,7 +14,7 @@ struct LevelPlane {
   [[nodiscard]] double at(const Eigen::Vector2d& xy) const { return height_m + slope.dot(xy); }
 };
 
-/// The lowest plane that many of the points lie on, by random samples (RANSAC, the same for the
+/// The plane that most of the points lie on, by random samples (RANSAC, the same for the
 /// same points) and least squares: at least `min_share` of them within 0.2 m, steeper than
 /// `max_slope` nowhere. Nothing where there is none.
 [[nodiscard]] std::optional<LevelPlane> fit_level_plane(std::span<const Eigen::Vector3f> points,

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <span>
+#include <utility>
 
 #include "core/frames/rigid_motion.hpp"
 #include "core/localization/level_plane.hpp"
@@ -57,6 +59,20 @@ std::vector<Eigen::Vector3f> near_ground(const FeatureSets& features) {
     if (point.position_lidar.norm() < max_ground_range_m) near.push_back(point.position_lidar);
   }
   return near;
+}
+
+std::optional<LevelPlane> ground_among(std::span<const Eigen::Vector3f> points) {
+  const auto plane = fit_level_plane(points, max_slope, min_ground_share);
+  const bool can_stand_on =
+      plane && -plane->height_m > min_lidar_height_m && -plane->height_m < max_lidar_height_m;
+  return can_stand_on ? plane : std::nullopt;
+}
+
+std::optional<LevelPlane> fit_ground(std::vector<Eigen::Vector3f> points) {
+  if (const auto ground = ground_among(points)) return ground;
+  // Of a ceiling a low lidar sees more than of the floor.
+  std::erase_if(points, [](const Eigen::Vector3f& p) { return p.z() >= 0.0F; });
+  return ground_among(points);
 }
 
 Eigen::Isometry3d foot_of(const LevelPlane& ground_upright) {
@@ -117,11 +133,9 @@ LocalizationQuery::LocalizationQuery(const Scan& scan, const PointLabels& labels
   };
   collect(features.upright_points, features_upright.points);
   collect(features.level_points, features_upright.level_points);
-  const std::vector<Eigen::Vector3f> ground = near_ground(features_upright);
-  const auto plane = fit_level_plane(ground, max_slope, min_ground_share);
-  has_ground =
-      plane && -plane->height_m > min_lidar_height_m && -plane->height_m < max_lidar_height_m;
-  if (has_ground) T_foot_upright = foot_of(*plane);
+  const auto ground = fit_ground(near_ground(features_upright));
+  has_ground = ground.has_value();
+  if (ground) T_foot_upright = foot_of(*ground);
   const Eigen::Isometry3f T = T_foot_upright.cast<float>();
   for (const FeaturePoint& point : features_upright.points) {
     if (point.position_lidar.norm() < max_landmark_range_m)

@@ -247,7 +247,12 @@ void Odometry::State::forget_stretch() {
 
 void Odometry::State::add_drift(std::int64_t time_ns, const PosePrediction& prediction,
                                 OdometryResult& result) {
-  if (!started) return;
+  if (!started) {
+    // It does not fit where the map was left, or where it was found.
+    if (has_prior_map && result.health == OdometryHealth::lost)
+      result.covariance = unknown_pose_covariance();
+    return;
+  }
   const bool is_followed =
       stretch && !stretch->has_jumped() && result.health != OdometryHealth::lost;
   const double since_s = (stretch ? stretch->trusted().intervals : intervals).since_last_s(time_ns);

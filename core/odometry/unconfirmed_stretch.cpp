@@ -62,6 +62,13 @@ Eigen::Matrix<double, 6, 6> drift_covariance(const RegisteredScan& known, double
   return sigma.cwiseAbs2().asDiagonal();
 }
 
+Eigen::Matrix<double, 6, 6> unknown_pose_covariance() {
+  PoseTangent sigma;
+  sigma.head<3>().setConstant(max_unconfirmed_m);
+  sigma.tail<3>().setConstant(max_unconfirmed_rad);
+  return sigma.cwiseAbs2().asDiagonal();
+}
+
 void UnconfirmedStretch::jump(double distance_m) {
   has_jumped_ = true;
   has_jumped_far_ |= distance_m > near_jump_m;

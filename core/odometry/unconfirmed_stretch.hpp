@@ -14,6 +14,9 @@ namespace stillmap {
 [[nodiscard]] Eigen::Matrix<double, 6, 6> drift_covariance(const RegisteredScan& known,
                                                            double since_s, bool is_followed);
 
+/// Of a pose of which nothing is known: deviations of 1 km, and of all directions alike.
+[[nodiscard]] Eigen::Matrix<double, 6, 6> unknown_pose_covariance();
+
 /// Scans whose place nothing older than they are has confirmed, since one of them did not show all
 /// of its motion or was found where it was not expected. They extend the local map, so that the
 /// motion among them is known, and so agree with one another wherever they are. What was known

@@ -150,11 +150,12 @@ std::string ServerReport::reason(const dds::ServerStatus& status) const {
   if (const std::string drop = statistics_.last_drop(); !drop.empty()) {
     return "the last scan was dropped: " + drop;
   }
+  const std::string search = statistics_.place_search();
   if (status.health == OdometryHealth::lost) {
-    const std::string search = statistics_.place_search();
     return "the odometry is lost: the last scan does not fit the map" +
            (search.empty() ? search : "; " + search);
   }
+  if (!search.empty()) return "nothing confirms the place: " + search;
   if (const std::string failure = statistics_.last_segmentation_failure(); !failure.empty()) {
     return "the last scan could not be segmented: " + failure;
   }

@@ -106,6 +106,39 @@ TEST(ResumedMap, ARelocatedLidarIsLookedForInItAlsoWhereItWasHeldBack) {
   EXPECT_LT(test::translation_error(found->odometry.T_map_lidar, T_map_lidar), 0.15);
 }
 
+// What uses the pose would take it for one that is off by 1 m.
+TEST(ResumedMap, OfAPoseThatDoesNotFitItNothingIsKnown) {
+  const MadeMap made = map_of_hall();
+  Mapper mapper(in_hall(), std::make_unique<NullSegmenter>());
+  mapper.resume(*made.view);
+  Scan elsewhere = test::room_scan(20);
+  for (Eigen::Vector3f& p : elsewhere.points_lidar) p.head<2>() *= 2.5F;
+  const auto mapped =
+      mapper.process(std::move(elsewhere), made.T_map_hall * test::room_pose(20).T_map_lidar);
+  ASSERT_TRUE(mapped);
+  ASSERT_EQ(mapped->odometry.health, OdometryHealth::lost);
+  EXPECT_GT(mapped->odometry.covariance(0, 0), 1e5);
+  EXPECT_GT(mapped->odometry.covariance(5, 5), 1.0);
+}
+
+TEST(ResumedMap, OfAPlaceThatIsNotConfirmedNothingIsKnownUntilItIs) {
+  const MadeMap made = map_of_hall();
+  Mapper mapper(in_hall(), std::make_unique<NullSegmenter>());
+  mapper.resume(*made.view);
+  mapper.relocate(Odometry(in_hall().odometry, vlp_16()), 3);
+  for (int k = 20; k < 25; ++k) {
+    const auto prior =
+        k == 20 ? std::optional(made.T_map_hall * test::room_pose(k).T_map_lidar) : std::nullopt;
+    const auto mapped = mapper.process(test::room_scan(k), prior);
+    ASSERT_TRUE(mapped);
+    const bool is_confirmed = k >= 22;
+    EXPECT_EQ(mapped->odometry.health,
+              is_confirmed ? OdometryHealth::good : OdometryHealth::degenerate)
+        << k;
+    EXPECT_EQ(mapped->odometry.covariance(0, 0) > 1e5, !is_confirmed) << k;
+  }
+}
+
 std::vector<Eigen::Isometry3d> poses_of(Mapper& mapper, const Eigen::Isometry3d& T_map_hall) {
   std::vector<Eigen::Isometry3d> T_map_lidar;
   for (int k = 20; k < 26; ++k) {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <numbers>
 #include <utility>
+#include <vector>
 
 #include "core/lidar/prepare.hpp"
 #include "core/simulation/simulation.hpp"
@@ -101,6 +102,37 @@ TEST(Localizer, PassesOverPosesThatAreNone) {
   const Localizer localizer(index_of(stored));
   const simulation::SimulatedScan scan = simulation::Simulation(yard(1, 1)).scan(170);
   expect_right(localize(localizer, scan), scan.T_map_lidar);
+}
+
+/// What 16 rings see of a hall of 70 by 40 m from its middle.
+Scan hall_scan(double lidar_height_m, double ceiling_height_m) {
+  Scan scan;
+  const Eigen::Vector3d high(35.0, 20.0, ceiling_height_m - lidar_height_m);
+  const Eigen::Vector3d low(-35.0, -20.0, -lidar_height_m);
+  for (int ring = 0; ring < 16; ++ring) {
+    const double elevation = (15.0 - 2.0 * ring) * rad_per_deg;
+    for (int k = 0; k < 900; ++k) {
+      const double azimuth = 0.4 * k * rad_per_deg;
+      const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
+                                std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+      double range_m = std::numeric_limits<double>::infinity();
+      for (int axis = 0; axis < 3; ++axis)
+        range_m = std::min(range_m, (ray[axis] > 0.0 ? high[axis] : low[axis]) / ray[axis]);
+      scan.points_lidar.push_back((range_m * ray).cast<float>());
+      scan.ring.push_back(static_cast<std::uint16_t>(ring));
+    }
+  }
+  return scan;
+}
+
+TEST(LocalizationQuery, StandsOnTheFloorUnderneathACeilingThatItSeesMoreOf) {
+  for (const auto& [lidar_height_m, ceiling_height_m] :
+       {std::pair(0.5, 2.7), std::pair(0.5, 3.5), std::pair(1.2, 2.7), std::pair(1.7, 8.0)}) {
+    const LocalizationQuery query(hall_scan(lidar_height_m, ceiling_height_m), {},
+                                  Eigen::Matrix3d::Identity());
+    EXPECT_TRUE(query.has_ground) << lidar_height_m << " m under " << ceiling_height_m;
+    EXPECT_NEAR(query.T_foot_upright.translation().z(), lidar_height_m, 0.05);
+  }
 }
 
 TEST(Localizer, AScanWithoutPointsIsNoEvidence) {
