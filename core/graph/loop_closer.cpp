@@ -27,10 +27,6 @@ PoseEdge odometry_edge(std::size_t from, const Eigen::Isometry3d& T_from_to, dou
           .is_loop = false};
 }
 
-double horizontal_sigma_m(const Eigen::Matrix3d& covariance_enu) {
-  return std::sqrt(0.5 * covariance_enu.topLeftCorner<2, 2>().trace());
-}
-
 constexpr const char* stayed_alone = "no second closure agreed with its jump";
 
 Submap without_points(const Submap& submap) {
@@ -50,6 +46,7 @@ void LoopCloser::add(const LabelledScan& scan, const Eigen::Isometry3d& T_odom_l
   const std::size_t index = T_odom_lidar_.size();
   T_odom_lidar_.push_back(T_odom_lidar);
   numbers_.push_back(number);
+  unconfirmed_.push_back((unconfirmed_.empty() ? 0 : unconfirmed_.back()) + (is_confirmed ? 0 : 1));
   if (!is_confirmed) return;
   if (nodes_.empty()) {
     nodes_.push_back({index, 0.0});
@@ -84,54 +81,67 @@ void LoopCloser::add(const PositionAtScan& position) {
                                      .point_node = T_node_scan * position.antenna_lidar,
                                      .position_enu = position.position_enu,
                                      .information = position.covariance_enu.inverse()};
-  const double sigma_m = horizontal_sigma_m(position.covariance_enu);
-  const double spacing_m =
-      std::max(config_.position_spacing_m, config_.position_spacing_sigmas * sigma_m);
-  if (positions_.empty() ||
-      nodes_[node].way_m - nodes_[positions_.back().node].way_m >= spacing_m) {
-    positions_.push_back(measured);
-    return;
-  }
-  // A receiver that has just got better is not bound by what it said before.
-  constexpr double clearly_better = 0.5;
-  const double last_sigma_m = horizontal_sigma_m(positions_.back().information.inverse());
-  if (positions_.size() > known_positions_ && sigma_m < clearly_better * last_sigma_m)
-    positions_.back() = measured;
+  positions_.add({.measured = measured,
+                  .point_odom = T_odom_lidar_[position.scan] * position.antenna_lidar,
+                  .way_m = nodes_[node].way_m,
+                  .unconfirmed_scans = unconfirmed_[position.scan]});
 }
 
 void LoopCloser::forget_positions() {
   positions_.clear();
-  known_positions_ = 0;
+  // What they bent goes back.
+  if (T_enu_map_) {
+    drop_positions();
+    solve();
+  }
+}
+
+void LoopCloser::drop_positions() {
   settled_doubts_.reset();
-  if (!std::exchange(T_enu_map_, std::nullopt)) return;
+  T_enu_map_.reset();
   graph_.positions.clear();
   graph_.T_enu_map.setIdentity();
-  // What they bent goes back.
-  solve();
 }
 
 LoopCloser::PositionCounts LoopCloser::position_counts() const {
   if (!T_enu_map_) return {};
-  PositionCounts counts{.used = graph_.positions.size(), .in_doubt = 0};
-  for (const PositionMeasurement& position : graph_.positions) {
-    const double squared = squared_error(position, graph_.T_map_node[position.node], *T_enu_map_);
-    if (squared > config_.max_squared_position_error) ++counts.in_doubt;
-  }
-  return counts;
+  const std::size_t others = positions_.disbelieved();
+  return {.used = graph_.positions.size() + others, .in_doubt = positions_in_doubt() + others};
+}
+
+std::size_t LoopCloser::positions_in_doubt() const {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(graph_.positions, [&](const PositionMeasurement& position) {
+        return squared_error(position, graph_.T_map_node[position.node], *T_enu_map_) >
+               config_.max_squared_position_error;
+      }));
 }
 
 void LoopCloser::use_positions() {
-  if (positions_.size() == known_positions_) return;
-  known_positions_ = positions_.size();
+  const std::vector<PositionMeasurement>& believed = positions_.believed();
+  const auto is_node = [](const PositionMeasurement& a, const PositionMeasurement& b) {
+    return a.node == b.node;
+  };
+  const std::size_t known = graph_.positions.size();
+  const bool goes_on =
+      known <= believed.size() &&
+      std::equal(graph_.positions.begin(), graph_.positions.end(), believed.begin(), is_node);
+  if (goes_on && known == believed.size()) return;
+  // More positions of another chain than of the one until now.
+  const bool was_bent = !goes_on && T_enu_map_.has_value();
+  if (was_bent) drop_positions();
   std::vector<PointOnEarth> points;
-  for (const PositionMeasurement& position : positions_) {
+  for (const PositionMeasurement& position : believed) {
     points.push_back({graph_.T_map_node[position.node] * position.point_node, position.position_enu,
                       horizontal_sigma_m(position.information.inverse())});
   }
   // Of the whole way each time: within their slack positions do not turn the map.
   if (const auto T_enu_map = align_to_earth(points, config_.earth)) T_enu_map_ = T_enu_map;
-  if (!T_enu_map_) return;
-  graph_.positions = positions_;
+  if (!T_enu_map_) {
+    if (was_bent) solve();
+    return;
+  }
+  graph_.positions = believed;
   graph_.T_enu_map = *T_enu_map_;
   solve();
 }
@@ -362,11 +372,11 @@ void LoopCloser::place_nodes() {
     return;
   }
   // Nothing new is far off: the narrow kernel takes nothing for a reflection that is none.
-  if (settled_doubts_ && position_counts().in_doubt <= *settled_doubts_) {
+  if (settled_doubts_ && positions_in_doubt() <= *settled_doubts_) {
     PoseGraph before = graph_;
     place_by_positions(1.0);
     // Those that are believed again must not hide as many others later.
-    if (const std::size_t doubts = position_counts().in_doubt; doubts <= *settled_doubts_) {
+    if (const std::size_t doubts = positions_in_doubt(); doubts <= *settled_doubts_) {
       settled_doubts_ = doubts;
       return;
     }
@@ -381,12 +391,11 @@ void LoopCloser::place_nodes() {
   for (const double width : {30.0, 5.0, 1.0}) {
     PoseGraph wider = graph_;
     place_by_positions(width);
-    const PositionCounts counts = position_counts();
-    if (static_cast<double>(counts.in_doubt) >
-        config_.max_doubted_share * static_cast<double>(counts.used))
+    if (static_cast<double>(positions_in_doubt()) >
+        config_.max_doubted_share * static_cast<double>(graph_.positions.size()))
       return take_graph(std::move(wider));
   }
-  settled_doubts_ = position_counts().in_doubt;
+  settled_doubts_ = positions_in_doubt();
 }
 
 void LoopCloser::place_by_positions(double width) {

@@ -11,6 +11,7 @@
 #include "core/geodesy/gnss_track.hpp"
 #include "core/graph/earlier_map.hpp"
 #include "core/graph/pose_graph.hpp"
+#include "core/graph/position_chains.hpp"
 #include "core/graph/submap.hpp"
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/trajectory.hpp"
@@ -91,12 +92,18 @@ struct DeniedLoop {
 /// the same result. NOT thread safe.
 class LoopCloser {
  public:
-  explicit LoopCloser(const LoopClosingConfig& config) : config_(config), builder_(config.submap) {}
+  explicit LoopCloser(const LoopClosingConfig& config)
+      : config_(config),
+        builder_(config.submap),
+        positions_(config.position_spacing_m, config.position_spacing_sigmas) {}
   /// Of a drive that begins in a map made earlier, and goes on in it: poses are in that map's
   /// frame, of which nothing moves. Submaps that are found in it are held there, and what odometry
   /// drifts by outside of it is made up for where the drive comes back.
   LoopCloser(const LoopClosingConfig& config, EarlierMap earlier)
-      : config_(config), earlier_(std::move(earlier)), builder_(config.submap) {}
+      : config_(config),
+        earlier_(std::move(earlier)),
+        builder_(config.submap),
+        positions_(config.position_spacing_m, config.position_spacing_sigmas) {}
 
   /// From now on nothing joins the submaps of these scans, nor their neighbours on the way: what
   /// looks alike does so from there, too. The scans may be still to come.
@@ -126,7 +133,8 @@ class LoopCloser {
   }
   /// Where the map lies in the frame of the positions; nothing while that is not known.
   [[nodiscard]] const std::optional<Eigen::Isometry3d>& T_enu_map() const { return T_enu_map_; }
-  /// Positions that take part, and how many of them the rest of the graph puts elsewhere.
+  /// Positions in all, and how many of them contradict the others, or the rest of the graph puts
+  /// elsewhere.
   struct PositionCounts {
     std::size_t used = 0;
     std::size_t in_doubt = 0;
@@ -205,6 +213,10 @@ class LoopCloser {
   void erase_edge(std::size_t edge);
   /// Has the new positions take part, once it is known where the map lies.
   void use_positions();
+  /// Of those in the graph.
+  [[nodiscard]] std::size_t positions_in_doubt() const;
+  /// Without those of the graph, of which it knew where the map lies.
+  void drop_positions();
   /// Poses of the nodes, and where the map lies.
   void place_nodes();
   /// By the positions, too, with their kernel so many times as wide as it is to be.
@@ -220,6 +232,8 @@ class LoopCloser {
   std::optional<EarlierMap> earlier_;
   SubmapBuilder builder_;
   std::vector<Eigen::Isometry3d> T_odom_lidar_;
+  /// Of the scans until each one, those that were not confirmed.
+  std::vector<std::size_t> unconfirmed_;
   /// Of the scans.
   std::vector<std::size_t> numbers_;
   std::vector<Node> nodes_;
@@ -235,9 +249,7 @@ class LoopCloser {
   std::size_t missed_submaps_ = 0;
   std::vector<LoopClosure> refused_;
   std::vector<DeniedLoop> denied_;
-  /// Those of the newest node may still be replaced by better ones.
-  std::vector<PositionMeasurement> positions_;
-  std::size_t known_positions_ = 0;
+  PositionChains positions_;
   std::optional<Eigen::Isometry3d> T_enu_map_;
   /// Positions that were in doubt when the graph was last placed by all of them.
   std::optional<std::size_t> settled_doubts_;

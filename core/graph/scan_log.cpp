@@ -14,8 +14,8 @@
 namespace stillmap {
 namespace {
 
-constexpr float step_m = 0.004F;
-constexpr std::uint64_t magic = 0x31474f4c4e414353;  // "SCANLOG1"
+constexpr float min_step_m = 0.004F;
+constexpr std::uint64_t magic = 0x32474f4c4e414353;  // "SCANLOG2"
 /// Larger ones are damage.
 constexpr std::uint64_t max_points = 100'000'000;
 
@@ -30,6 +30,7 @@ struct Header {
   std::uint64_t packed_bytes = 0;
   std::uint32_t entry = 0;
   std::uint32_t has_labels = 0;
+  double step_m = 0.0;
 };
 
 /// Planes of bytes, one after the other: low and high bytes of the differences of x, y and z from
@@ -46,18 +47,19 @@ bool has_points(MapEntry entry) {
   return entry != MapEntry::stays_out && entry != MapEntry::stays_out_with_waiting;
 }
 
-/// What is farther than that along an axis is nearer on its ray: seen through as far as it matters,
-/// and in no other direction.
-Eigen::Vector3f in_steps(const Eigen::Vector3f& point_m) {
+/// What is farther than all steps along an axis is nearer on its ray: seen through as far as it
+/// matters, and in no other direction.
+Eigen::Vector3f in_steps(const Eigen::Vector3f& point_m, float step_m) {
   const Eigen::Vector3f steps = point_m / step_m;
   return steps * std::min(1.0F, max_steps / std::max(steps.cwiseAbs().maxCoeff(), 1.0F));
 }
 
-std::vector<std::uint8_t> to_planes(const LabelledScan& labelled) {
+std::vector<std::uint8_t> to_planes(const LabelledScan& labelled, float step_m) {
   const std::size_t count = labelled.scan.size();
   std::vector<std::uint8_t> bytes(planes * count);
   std::vector<Eigen::Vector3f> steps(count);
-  std::ranges::transform(labelled.scan.points_lidar, steps.begin(), in_steps);
+  std::ranges::transform(labelled.scan.points_lidar, steps.begin(),
+                         [&](const Eigen::Vector3f& p) { return in_steps(p, step_m); });
   for (int axis = 0; axis < 3; ++axis) {
     std::uint16_t last = 0;
     const std::size_t low = 2 * static_cast<std::size_t>(axis) * count;
@@ -81,6 +83,7 @@ std::vector<std::uint8_t> to_planes(const LabelledScan& labelled) {
 
 LabelledScan from_planes(std::span<const std::uint8_t> bytes, const Header& header) {
   const std::size_t count = header.points;
+  const auto step_m = static_cast<float>(header.step_m);
   LabelledScan labelled;
   labelled.scan.stamp_ns = header.stamp_ns;
   labelled.scan.points_lidar.resize(count);
@@ -134,13 +137,15 @@ Header header_of(const LoggedScan& scan) {
 bool read_header(std::istream& in, Header& header) {
   in.read(reinterpret_cast<char*>(&header), sizeof(header));
   return in && header.magic_number == magic && header.points <= max_points &&
-         header.entry < entries.size() &&
+         header.entry < entries.size() && std::isfinite(header.step_m) &&
          header.packed_bytes <= ZSTD_compressBound(planes * header.points) + sizeof(std::uint32_t);
 }
 
 }  // namespace
 
-ScanLog::ScanLog(std::filesystem::path file) : file_(std::move(file)) {
+ScanLog::ScanLog(std::filesystem::path file, double reach_m)
+    : file_(std::move(file)),
+      step_m_(std::max(min_step_m, static_cast<float>(reach_m) / max_steps)) {
   if (!std::filesystem::exists(file_)) std::ofstream(file_, std::ios::binary);
   stream_.open(file_, std::ios::in | std::ios::out | std::ios::binary);
   if (!stream_) throw DatasetError(file_, "cannot be opened; check the folder and its rights");
@@ -164,8 +169,9 @@ void ScanLog::scan_records() {
 
 void ScanLog::append(const LoggedScan& scan) {
   Header header = header_of(scan);
+  header.step_m = static_cast<double>(step_m_);
   std::vector<std::uint8_t> packed;
-  if (header.points > 0) packed = compressed(to_planes(scan.labelled), file_);
+  if (header.points > 0) packed = compressed(to_planes(scan.labelled, step_m_), file_);
   header.packed_bytes = packed.size();
   stream_.seekp(static_cast<std::streamoff>(end_));
   stream_.write(reinterpret_cast<const char*>(&header), sizeof(header));

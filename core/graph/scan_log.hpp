@@ -20,8 +20,8 @@ struct LoggedScan {
   Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
   /// Only scans that enter the map or may do so later have points.
   MapEntry entry = MapEntry::enters;
-  /// Points [m] in steps of 4 mm, up to 131 m along each axis; classes; confidence in 1/255;
-  /// motion.
+  /// Points [m] in steps of 4 mm, or of 1/32767 of the log's reach; classes; confidence in 1/255;
+  /// motion. Points beyond the reach, or beyond 131 m where that is more, are nearer on their rays.
   LabelledScan labelled;
 };
 
@@ -29,8 +29,9 @@ struct LoggedScan {
 /// after its poses were corrected. What a killed process left incomplete at its end is dropped.
 class ScanLog {
  public:
-  /// Opens or makes it. Throws DatasetError.
-  explicit ScanLog(std::filesystem::path file);
+  /// Opens or makes it. `reach_m`: points up to there come back where they were. Throws
+  /// DatasetError.
+  ScanLog(std::filesystem::path file, double reach_m);
 
   /// Throws DatasetError.
   void append(const LoggedScan& scan);
@@ -53,6 +54,7 @@ class ScanLog {
   void scan_records();
 
   std::filesystem::path file_;
+  float step_m_;
   std::fstream stream_;
   struct Record {
     std::uint64_t index;

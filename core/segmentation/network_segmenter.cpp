@@ -4,7 +4,11 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
 #include <span>
+#include <system_error>
 #include <utility>
 
 #include "core/lidar/range_image.hpp"
@@ -152,6 +156,17 @@ PointLabels NetworkSegmenter::segment_with(SegmentationNetwork& network, int col
 
 namespace {
 
+/// Size and time of change of a file; nothing where it is gone.
+std::optional<std::pair<std::uintmax_t, std::filesystem::file_time_type>> version_of(
+    const std::filesystem::path& file) {
+  std::error_code fault;
+  const std::uintmax_t bytes = std::filesystem::file_size(file, fault);
+  if (fault) return std::nullopt;
+  const auto changed = std::filesystem::last_write_time(file, fault);
+  if (fault) return std::nullopt;
+  return std::pair(bytes, changed);
+}
+
 /// With a network of one thread for each scan at a time, where the engine leaves the choice.
 std::unique_ptr<NetworkSegmenter> open_finest(const ModelDescription& model,
                                               const EngineOptions& choice) {
@@ -164,7 +179,12 @@ std::unique_ptr<NetworkSegmenter> open_finest(const ModelDescription& model,
   one_thread.threads = 1;
   segmenter->allow_concurrent_scans(
       static_cast<std::size_t>(threads),
-      [model, one_thread](int columns) { return open_with_columns(model, columns, one_thread); });
+      [model, one_thread, read = version_of(model.network_file)](int columns) {
+        // Not the weights of another training beside those that are in use.
+        if (version_of(model.network_file) != read)
+          throw ModelError(model.network_file, "was changed since it was read");
+        return open_with_columns(model, columns, one_thread);
+      });
   return segmenter;
 }
 

@@ -44,6 +44,9 @@ class Segmenter {
   /// Current width of its range images; 0 when it uses none.
   [[nodiscard]] virtual int image_columns() const { return 0; }
 
+  /// Whether the scan brings its labels: then segment() takes no time, and may be called beside
+  /// other calls.
+  [[nodiscard]] virtual bool has_labels(const Scan& /*scan*/) const { return false; }
   /// Classes of the scan's points; empty when there are none for this scan.
   [[nodiscard]] virtual PointLabels segment(const Scan& scan) = 0;
 };
@@ -85,6 +88,7 @@ class FallbackSegmenter final : public Segmenter {
   [[nodiscard]] int image_columns() const override {
     return uses_stream_ ? 0 : fallback_->image_columns();
   }
+  [[nodiscard]] bool has_labels(const Scan& scan) const override { return !scan.labels.empty(); }
   [[nodiscard]] PointLabels segment(const Scan& scan) override;
 
  private:

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <iterator>
 #include <utility>
 
 #include "server/mapping/milliseconds.hpp"
@@ -59,8 +60,12 @@ SegmentationPipeline::Output AsyncSegmenter::submit(const Scan& scan) {
     output.finished.push_back(segment(scan));
     return output;
   }
+  if (source_->has_labels(scan)) {
+    output.finished.push_back({scan.stamp_ns, source_->segment(scan)});
+    statistics_.segmentation_succeeded();
+  }
   std::unique_lock lock(mutex_);
-  if (is_due()) {
+  if (output.finished.empty() && is_due()) {
     const std::uint64_t number = ++submissions_;
     in_work_.insert(number);
     scans_since_segmented_ = 0;
@@ -72,7 +77,8 @@ SegmentationPipeline::Output AsyncSegmenter::submit(const Scan& scan) {
     }
     output.pending = in_work_.contains(number);
   }
-  output.finished = std::exchange(finished_, {});
+  std::ranges::move(finished_, std::back_inserter(output.finished));
+  finished_.clear();
   std::ranges::sort(output.finished, {}, &ScanLabels::stamp_ns);
   return output;
 }

@@ -238,7 +238,13 @@ void LoopCorrector::hand_on_fixes(const Run& run) {
   }
   if (run.earlier_until_ns) {
     // Where an earlier map lies on the earth is known to who made it.
-    if (!fixes.empty()) statistics_.count("gnss_fixes_unused", fixes.size());
+    if (fixes.empty()) return;
+    statistics_.count("gnss_fixes_unused", fixes.size());
+    if (std::exchange(map_without_fixes_, run.map) != run.map) {
+      spdlog::warn(
+          "GNSS: fixes are not used from here on: this part of the drive is held by the map from "
+          "before it, which was loaded, or in which the robot was found again");
+    }
     return;
   }
   for (const GnssFix& fix : fixes) {

@@ -175,6 +175,8 @@ class LoopCorrector {
 
   // Of the worker.
   std::uint64_t closed_map_ = 0;
+  /// That a fix was last refused for, as it is not this run's alone.
+  std::uint64_t map_without_fixes_ = 0;
   std::optional<LiveLoopCloser> closer_;
   /// Of the map that is looked at; those that stay out between them are left out.
   WaitingScans<ScanOfMap> waiting_;

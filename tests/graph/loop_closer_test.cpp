@@ -331,6 +331,26 @@ TEST(LoopCloser, PositionsAreBelievedWhereMostOfThemContradictOdometry) {
   EXPECT_GT(doubted_m, 1.5 * believed_m);
 }
 
+// In a tunnel, or a car park.
+TEST(LoopCloser, AReceiverThatHoldsItsLastPositionDoesNotBendTheMap) {
+  const StreetWorld world(12);
+  const Drive arc = drive(world, 0.6 * StreetWorld::length_m, 0.0, 0.0);
+  LoopCloser closer(LoopClosingConfig{});
+  const Eigen::Isometry3d T_map_first = world.T_map_lidar_at(0.0, false);
+  for (std::size_t i = 0; i < arc.truth.size(); ++i) {
+    closer.add(world.scan_at(T_map_first * arc.truth[i], i), arc.odometry[i], true);
+    const std::size_t heard = std::min(i, arc.truth.size() / 2);
+    closer.add({.scan = i,
+                .antenna_lidar = Eigen::Vector3d::Zero(),
+                .position_enu = T_enu_map_true * arc.truth[heard].translation(),
+                .covariance_enu = Eigen::Matrix3d::Identity()});
+  }
+  closer.finish();
+  ASSERT_TRUE(closer.T_enu_map());
+  EXPECT_GT(closer.position_counts().in_doubt, closer.position_counts().used / 3);
+  EXPECT_LT(rmse_m(closer.corrected_poses(), arc), 0.3);
+}
+
 // What errs by more than the map has drifted is not to bend it.
 TEST(LoopCloser, PositionsThatAgreeWithTheMapHardlyBendIt) {
   const StreetWorld world(12);

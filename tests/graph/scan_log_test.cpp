@@ -55,7 +55,7 @@ std::vector<LoggedScan> all_of(ScanLog& log) {
 
 TEST(ScanLog, ScansComeBack) {
   const ScratchFolder scratch;
-  ScanLog log(scratch / "scans");
+  ScanLog log(scratch / "scans", 60.0);
   const LoggedScan labelled = random_scan(3, true), plain = random_scan(5, false);
   LoggedScan lost = random_scan(6, true);
   lost.entry = MapEntry::stays_out;
@@ -80,7 +80,7 @@ TEST(ScanLog, ScansComeBack) {
 
 TEST(ScanLog, WhatIsTooFarStaysOnItsRay) {
   const ScratchFolder scratch;
-  ScanLog log(scratch / "scans");
+  ScanLog log(scratch / "scans", 60.0);
   LoggedScan scan = random_scan(3, false);
   const Eigen::Vector3f far(180.0F, 60.0F, 5.0F);
   scan.labelled.scan.points_lidar[7] = far;
@@ -92,16 +92,27 @@ TEST(ScanLog, WhatIsTooFarStaysOnItsRay) {
   EXPECT_LT(kept.normalized().cross(far.normalized()).norm(), 1e-4F);
 }
 
+TEST(ScanLog, WhatAMapReachesComesBack) {
+  const ScratchFolder scratch;
+  LoggedScan scan = random_scan(3, false);
+  const Eigen::Vector3f far(180.0F, 60.0F, 5.0F);
+  scan.labelled.scan.points_lidar[7] = far;
+  ScanLog(scratch / "scans", 200.0).append(scan);
+  // Whatever it is opened with.
+  ScanLog log(scratch / "scans", 60.0);
+  EXPECT_LT((log.at(0).labelled.scan.points_lidar[7] - far).norm(), 0.006F);
+}
+
 TEST(ScanLog, AnotherProcessGoesOnWhereOneWasKilled) {
   const ScratchFolder scratch;
   {
-    ScanLog log(scratch / "scans");
+    ScanLog log(scratch / "scans", 60.0);
     for (std::uint64_t i = 0; i < 5; ++i) log.append(random_scan(i, true));
   }
   // The last record is cut through.
   const auto size = std::filesystem::file_size(scratch / "scans");
   std::filesystem::resize_file(scratch / "scans", size - 10);
-  ScanLog log(scratch / "scans");
+  ScanLog log(scratch / "scans", 60.0);
   EXPECT_EQ(all_of(log).size(), 4U);
   log.truncate_from(3);
   log.append(random_scan(3, false));
@@ -112,7 +123,7 @@ TEST(ScanLog, AnotherProcessGoesOnWhereOneWasKilled) {
 
 TEST(ScanLog, DamageIsNamed) {
   const ScratchFolder scratch;
-  ScanLog log(scratch / "scans");
+  ScanLog log(scratch / "scans", 60.0);
   log.append(random_scan(0, true));
   log.flush();
   std::fstream file(scratch / "scans", std::ios::in | std::ios::out | std::ios::binary);
@@ -121,7 +132,7 @@ TEST(ScanLog, DamageIsNamed) {
   file.write(garbage.data(), static_cast<std::streamsize>(garbage.size()));
   file.close();
   EXPECT_THROW(all_of(log), DatasetError);
-  EXPECT_THROW(ScanLog(scratch.path() / "no" / "folder"), DatasetError);
+  EXPECT_THROW(ScanLog(scratch.path() / "no" / "folder", 60.0), DatasetError);
 }
 
 }  // namespace

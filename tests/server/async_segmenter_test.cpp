@@ -80,6 +80,26 @@ TEST_F(AsyncSegmenterTest, CatchingUpComesFirstButNotForEver) {
   EXPECT_FALSE(labels->submit(scan_at(33)).finished.empty());
 }
 
+TEST_F(AsyncSegmenterTest, LabelsThatCameWithAScanAreKeptWhateverWaits) {
+  source_.is_held = true;
+  AsyncSegmenter labels(
+      std::make_unique<FallbackSegmenter>(std::make_unique<test::SlowSegmenter>(source_)), 20ms,
+      queue_, statistics_);
+  Scan unlabelled = scan_at(1);
+  unlabelled.labels.clear();
+  EXPECT_TRUE(labels.submit(unlabelled).pending);
+  EXPECT_EQ(queue_.push_dropping_oldest({scan_at(100), "lidar", Clock::now()}), 0U);
+  for (int k = 2; k < 12; ++k) {
+    const auto output = labels.submit(scan_at(k));
+    ASSERT_EQ(output.finished.size(), 1U) << k;
+    EXPECT_EQ(output.finished[0].stamp_ns, k);
+    EXPECT_EQ(output.finished[0].labels.classes[0], SemanticClass::road);
+    EXPECT_FALSE(output.pending);
+  }
+  source_.is_held = false;
+  source_.is_held.notify_all();
+}
+
 TEST_F(AsyncSegmenterTest, CoresTakeAScanEachWhereTheyAreTooSlowTogether) {
   source_.concurrent_scans = 3;
   source_.delay_ms = 60;

@@ -77,8 +77,16 @@ std::vector<std::filesystem::path> label_files(const std::filesystem::path& fold
   return files;
 }
 
-SequenceScore compare_files(const std::string& truth, const std::string& predicted) {
-  const auto predictions = label_files(predicted, "predictions");
+SequenceScore compare_files(const EvaluateSegmentationArguments& arguments) {
+  const std::string& truth = arguments.truth.front();
+  auto predictions = label_files(arguments.predictions, "predictions");
+  if (arguments.range.first >= predictions.size() || arguments.range.count == 0) {
+    throw std::invalid_argument("--start and --scans leave none of the " +
+                                std::to_string(predictions.size()) + " predictions");
+  }
+  predictions.erase(predictions.begin(),
+                    predictions.begin() + static_cast<std::ptrdiff_t>(arguments.range.first));
+  if (arguments.range.count < predictions.size()) predictions.resize(arguments.range.count);
   const std::filesystem::path truth_folder = label_files(truth, "labels").front().parent_path();
   Progress progress("compare", "scans", predictions.size());
   SequenceScore compared{.sequence = truth, .score = {}};
@@ -136,7 +144,7 @@ ExitCode run(const EvaluateSegmentationArguments& arguments) {
       sequences.push_back(run_model(arguments, number));
     }
   } else if (arguments.truth.size() == 1) {
-    sequences.push_back(compare_files(arguments.truth.front(), arguments.predictions));
+    sequences.push_back(compare_files(arguments));
   } else {
     throw std::invalid_argument("--predictions are those of one sequence, --truth names " +
                                 std::to_string(arguments.truth.size()));
@@ -165,13 +173,17 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
               "Name or folder of the model to run; 'model' is the default one")
       .with_default()
       .excludes(predictions);
-  command.option("--sensor", arguments->mapper.sensor,
-                 "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the data set suggests");
+  command
+      .option("--sensor", arguments->mapper.sensor,
+              "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the data set suggests")
+      .excludes(predictions);
   add_segmentation_options(command, arguments->mapper);
-  command.option("--start", arguments->range.first, "Number of the first scan");
+  command.option("--start", arguments->range.first, "Number of the first scan, or prediction");
   command.option("--scans,--count", arguments->range.count, "Take as many scans at most");
-  command.option("--picture", arguments->picture,
-                 "PNG of the first scan's range image: true classes above those found");
+  command
+      .option("--picture", arguments->picture,
+              "PNG of the first scan's range image: true classes above those that the model found")
+      .excludes(predictions);
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"

@@ -43,10 +43,10 @@ Json json_of(const ConfusionMatrix& matrix) {
     by_group.set(std::string(group.name), share_or_null(matrix.iou(group.classes)));
   }
   return {{"points", matrix.total()},
-          {"miou", matrix.mean_iou()},
-          {"miou_present", matrix.mean_iou_of_present().value_or(0.0)},
-          {"miou_groups", evaluation::mean_iou_of_groups(matrix).value_or(0.0)},
-          {"accuracy", matrix.accuracy().value_or(0.0)},
+          {"miou", matrix.total() > 0 ? Json(matrix.mean_iou()) : Json(nullptr)},
+          {"miou_present", share_or_null(matrix.mean_iou_of_present())},
+          {"miou_groups", share_or_null(evaluation::mean_iou_of_groups(matrix))},
+          {"accuracy", share_or_null(matrix.accuracy())},
           {"iou", by_class},
           {"iou_of_groups", by_group}};
 }

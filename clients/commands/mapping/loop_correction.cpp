@@ -34,7 +34,7 @@ LoopCorrection::LoopCorrection(LoopOptions options, const SensorModel& sensor)
       antenna_lidar_(options.gnss.antenna_lidar),
       gnss_(options.gnss.config),
       sensor_(sensor),
-      log_(options.scans_file),
+      log_(options.scans_file, options.max_range_m),
       closer_(LoopClosingConfig{}) {
   std::ranges::stable_sort(fixes_, {}, &GnssFix::stamp_ns);
   for (const DeniedLoop& denied : options.denied) closer_.deny(denied);

@@ -64,6 +64,8 @@ struct GnssOptions {
 struct LoopOptions {
   /// Where the scans are kept meanwhile.
   std::filesystem::path scans_file;
+  /// So far scans go into the map.
+  double max_range_m = 0.0;
   /// Scans as they are numbered in the data set.
   std::vector<DeniedLoop> denied;
   GnssOptions gnss;

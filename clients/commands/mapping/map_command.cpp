@@ -309,7 +309,7 @@ MappingResult map_into(const MapOutputFolder& out, const ScanDataset& dataset,
                    std::chrono::duration<double>(arguments.save_period_s));
   std::optional<LoopOptions> loops;
   if (arguments.loops == "on")
-    loops = {out.kept_scans_file(), denied_loops(arguments, dataset),
+    loops = {out.kept_scans_file(), config.static_map.max_range_m, denied_loops(arguments, dataset),
              gnss_options(arguments, dataset, body)};
   return map_with_progress(dataset, arguments, config, body, std::move(labels), run_file, loops,
                            earlier, stop);

@@ -78,7 +78,7 @@ ExitCode run(const ModelAgreeArguments& arguments) {
   std::vector<ScanDataset> datasets;
   datasets.emplace_back(arguments.dataset);
   const ModelDescription model =
-      for_sensor(load_model(arguments.model), datasets.front().suggested_sensor());
+      fitted(arguments.model, load_model(arguments.model), datasets.front().suggested_sensor());
   const Networks networks = open_all(model);
   std::vector<Agreement> results;
   for (std::size_t n = 1; n < networks.size(); ++n) {

@@ -57,6 +57,14 @@ ModelDescription load_uncalibrated_model(const ModelArguments& arguments) {
   });
 }
 
+ModelDescription fitted(const ModelArguments& arguments, const ModelDescription& model,
+                        const SensorModel& sensor) {
+  ModelDescription fitted = for_sensor(model, sensor);
+  if (arguments.rows > 0) fitted.rows = static_cast<int>(arguments.rows);
+  if (arguments.columns > 0) fitted.columns = static_cast<int>(arguments.columns);
+  return fitted;
+}
+
 std::vector<ScanSample> choose_scans(const std::vector<ScanDataset>& datasets, std::size_t count) {
   std::size_t total = 0;
   for (const ScanDataset& dataset : datasets) total += dataset.size();

@@ -28,6 +28,10 @@ void add_model_options(CommandHandle command, ModelArguments& arguments);
 /// The same without reading int8.yaml.
 [[nodiscard]] ModelDescription load_uncalibrated_model(const ModelArguments& arguments);
 
+/// The model for a sensor, of the rows and columns that the arguments name.
+[[nodiscard]] ModelDescription fitted(const ModelArguments& arguments,
+                                      const ModelDescription& model, const SensorModel& sensor);
+
 /// Scans of several data sets, evenly chosen.
 struct ScanSample {
   const ScanDataset* dataset = nullptr;

@@ -1,3 +1,4 @@
+#include <filesystem>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -7,6 +8,7 @@
 #include "clients/terminal/progress.hpp"
 #include "config/loaders/int8_file.hpp"
 #include "core/segmentation/int8_calibration.hpp"
+#include "core/segmentation/model_error.hpp"
 #include "core/segmentation/onednn_network.hpp"
 
 namespace stillmap::cli {
@@ -25,11 +27,12 @@ struct FittedNetwork {
   ModelDescription model;
   OneDnnNetwork network;
 
-  FittedNetwork(const ModelDescription& any, const SensorModel& sensor)
-      : model(for_sensor(any, sensor)), network(model, Precision::fp32) {}
+  FittedNetwork(const ModelArguments& arguments, const ModelDescription& any,
+                const SensorModel& sensor)
+      : model(fitted(arguments, any, sensor)), network(model, Precision::fp32) {}
 };
 
-ActivationRanges observe_activations(const ModelDescription& model,
+ActivationRanges observe_activations(const ModelArguments& arguments, const ModelDescription& model,
                                      const std::vector<ScanSample>& samples) {
   std::map<const ScanDataset*, FittedNetwork> networks;
   ActivationRanges ranges;
@@ -37,7 +40,7 @@ ActivationRanges observe_activations(const ModelDescription& model,
   std::uint64_t done = 0;
   for (const ScanSample& sample : samples) {
     FittedNetwork& fitted =
-        networks.try_emplace(sample.dataset, model, sample.dataset->suggested_sensor())
+        networks.try_emplace(sample.dataset, arguments, model, sample.dataset->suggested_sensor())
             .first->second;
     fitted.network.observe(input_of(sample, fitted.model),
                            [&ranges](const std::string& tensor, auto values, std::size_t channels) {
@@ -50,10 +53,15 @@ ActivationRanges observe_activations(const ModelDescription& model,
 
 ExitCode run(const ModelCalibrateArguments& arguments) {
   const ModelDescription model = load_uncalibrated_model(arguments.model);
+  if (std::filesystem::path(arguments.model.model).extension() == ".onnx") {
+    throw ModelError(model.network_file,
+                     "is a network alone, and how its input is normalised is not known; name its "
+                     "folder, with a model.yaml");
+  }
   std::vector<ScanDataset> datasets;
   for (const std::string& folder : arguments.datasets) datasets.emplace_back(folder);
   const std::vector<ScanSample> samples = choose_scans(datasets, arguments.scans);
-  const ActivationRanges ranges = observe_activations(model, samples);
+  const ActivationRanges ranges = observe_activations(arguments.model, model, samples);
   Int8Calibration calibration;
   calibration.made = std::to_string(samples.size()) + " scans of " +
                      std::to_string(datasets.size()) + " data sets";
@@ -77,7 +85,9 @@ void add_model_calibrate_command(CommandHandle model, Action& action) {
       .option("DATASET", arguments->datasets,
               "Data sets like those on which the network will work; no labels are needed")
       .required();
-  command.option("--scans", arguments->scans, "Scans to look at, evenly chosen").with_default();
+  command.option("--scans", arguments->scans, "Scans to look at, evenly chosen")
+      .above_zero()
+      .with_default();
   command
       .option("--share", arguments->share,
               "Share of a channel's values that must not be cut off, 0..1; 1: none is")

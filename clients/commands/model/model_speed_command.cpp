@@ -289,14 +289,16 @@ void add_model_speed_command(CommandHandle model, Action& action) {
       "--dataset", arguments->dataset,
       "Data set or bag whose first scan is taken; default: one of 64 x 1900 made-up points");
   command.option("--topic-in", arguments->topic_in, topic_in_help).needs(dataset);
-  command.option("--threads", arguments->threads, "Threads of oneDNN; default: all")
-      .between(0, 1024);
+  const OptionHandle threads =
+      command.option("--threads", arguments->threads, "Threads of oneDNN; default: all")
+          .between(0, 1024);
   command
       .option(
           "--beside", arguments->beside,
           "Numbers of busy loops: time from scan to labels and scans a second beside them, with "
           "all threads on one scan and with a scan on each, oneDNN alone: 1,2,4")
-      .comma_separated();
+      .comma_separated()
+      .excludes(threads);
   command.flag("--skip-opencv", arguments->skip_opencv, "Leave the slow reference engine out");
   command.explain(
       "Examples:\n"

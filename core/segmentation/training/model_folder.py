@@ -50,6 +50,8 @@ def write_model(folder, network, description):
     image = description["image"]
     shape = len(description["statistics"]), image["rows"], image["columns"]
     export_onnx(network, folder / "model.onnx", shape, image["follow_sensor"])
+    # Of the weights that were there before.
+    (folder / "int8.yaml").unlink(missing_ok=True)
     text = yaml.safe_dump(description, sort_keys=False, width=100, allow_unicode=True)
     (folder / "model.yaml").write_text(text)
 

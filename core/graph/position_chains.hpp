@@ -1,0 +1,62 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "core/graph/pose_graph.hpp"
+
+namespace stillmap {
+
+/// A measured position of a drive, as the graph takes it, and what odometry knows of its place.
+struct PositionOnWay {
+  PositionMeasurement measured;
+  /// The antenna where odometry has it [m].
+  Eigen::Vector3d point_odom = Eigen::Vector3d::Zero();
+  /// Way of the lidar until there [m].
+  double way_m = 0.0;
+  /// Scans until there whose poses odometry could not confirm.
+  std::size_t unconfirmed_scans = 0;
+};
+
+/// Of the horizontal standard deviation of a measured position [m].
+[[nodiscard]] double horizontal_sigma_m(const Eigen::Matrix3d& covariance_enu);
+
+/// Sorts measured positions by what they say of the way between them: those that follow each other
+/// as far apart as odometry has them are a chain. A receiver that holds its last position, or sees
+/// reflections, says of the way what is not so, or what nothing before it goes on to; most of what
+/// it says does not. The largest chain is believed.
+class PositionChains {
+ public:
+  /// Of one chain, positions count once on so much way, and once on so many of their standard
+  /// deviations.
+  PositionChains(double spacing_m, double spacing_sigmas)
+      : spacing_m_(spacing_m), spacing_sigmas_(spacing_sigmas) {}
+
+  /// Positions come in the order of their way.
+  void add(const PositionOnWay& position);
+  void clear();
+
+  /// Those of the largest chain. The newest one may still be replaced by a better one, until this
+  /// is called.
+  [[nodiscard]] const std::vector<PositionMeasurement>& believed();
+  /// Positions of other chains.
+  [[nodiscard]] std::size_t disbelieved() const;
+
+ private:
+  struct Chain {
+    std::vector<PositionMeasurement> positions;
+    PositionOnWay last;
+  };
+  void extend(Chain& chain, const PositionOnWay& position) const;
+
+  double spacing_m_;
+  double spacing_sigmas_;
+  std::vector<Chain> chains_;
+  /// Of chains that were left off.
+  std::size_t dropped_ = 0;
+  /// Positions of the largest chain that are in use.
+  std::size_t used_ = 0;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,97 @@
+#include "core/graph/position_chains.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+namespace stillmap {
+namespace {
+
+/// Of a drive of 600 m in a wide curve, every metre.
+Eigen::Vector3d place(int k) {
+  const double angle = k / 200.0;
+  return {200.0 * std::sin(angle), 200.0 * (1.0 - std::cos(angle)), 0.0};
+}
+
+PositionOnWay measured(int k, const Eigen::Vector3d& position_enu, double sigma_m = 1.0) {
+  PositionOnWay position;
+  position.measured.node = static_cast<std::size_t>(k);
+  position.measured.position_enu = position_enu;
+  position.measured.information = Eigen::Matrix3d::Identity() / (sigma_m * sigma_m);
+  position.point_odom = place(k);
+  position.way_m = k;
+  return position;
+}
+
+/// Chains of 600 positions, each as `say` has it of the true one.
+PositionChains chains_of(const std::function<Eigen::Vector3d(int, const Eigen::Vector3d&)>& say) {
+  PositionChains chains(5.0, 10.0);
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  for (int k = 0; k < 600; ++k) {
+    const Eigen::Vector3d error(noise(random), noise(random), noise(random));
+    chains.add(measured(k, say(k, place(k) + error)));
+  }
+  return chains;
+}
+
+TEST(PositionChains, AllOfAGoodReceiverAreOne) {
+  PositionChains chains = chains_of([](int, const Eigen::Vector3d& p) { return p; });
+  EXPECT_GE(chains.believed().size(), 55U);
+  EXPECT_LE(chains.disbelieved(), 3U);
+}
+
+TEST(PositionChains, AReceiverThatHoldsItsPositionIsNotBelieved) {
+  const Eigen::Vector3d held = place(250);
+  PositionChains chains =
+      chains_of([&](int k, const Eigen::Vector3d& p) { return k < 250 ? p : held; });
+  ASSERT_FALSE(chains.believed().empty());
+  EXPECT_GE(chains.believed().size(), 20U);
+  EXPECT_LT(chains.believed().back().node, 262U);
+  EXPECT_GT(chains.disbelieved(), 25U);
+}
+
+TEST(PositionChains, WhatHoldsItsPositionFromTheBeginningOnMakesNoChain) {
+  PositionChains chains =
+      chains_of([](int, const Eigen::Vector3d&) { return Eigen::Vector3d(1.0, 2.0, 3.0); });
+  EXPECT_LE(chains.believed().size(), 3U);
+}
+
+TEST(PositionChains, OfTwoThatAreApartTheLongerOneIsBelieved) {
+  const Eigen::Vector3d reflected(20.0, 0.0, 0.0);
+  for (const int until : {200, 400}) {
+    PositionChains chains = chains_of(
+        [&](int k, const Eigen::Vector3d& p) { return k < until ? p : (p + reflected).eval(); });
+    const auto& believed = chains.believed();
+    const bool is_first = believed.front().node == 0;
+    EXPECT_EQ(is_first, until == 400) << until;
+  }
+}
+
+TEST(PositionChains, AReceiverGoesOnWhereOdometryWasLost) {
+  PositionChains chains(5.0, 10.0);
+  for (int k = 0; k < 600; ++k) {
+    PositionOnWay position = measured(k, place(k));
+    // It has the robot 6 m from where it is since then.
+    if (k >= 300) position.point_odom.x() += 6.0;
+    position.unconfirmed_scans = k >= 300 ? 4 : 0;
+    chains.add(position);
+  }
+  EXPECT_EQ(chains.disbelieved(), 0U);
+}
+
+TEST(PositionChains, ABetterOneReplacesTheNewestUntilItIsInUse) {
+  for (const bool is_in_use : {false, true}) {
+    PositionChains chains(5.0, 10.0);
+    chains.add(measured(0, place(0)));
+    if (is_in_use) (void)chains.believed();
+    chains.add(measured(1, place(1), 0.1));
+    ASSERT_EQ(chains.believed().size(), 1U);
+    EXPECT_EQ(chains.believed()[0].node, is_in_use ? 0U : 1U);
+  }
+}
+
+}  // namespace
+}  // namespace stillmap
