@@ -3,6 +3,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <fstream>
+#include <system_error>
 
 #include "config/loaders/yaml_section.hpp"
 
@@ -52,10 +53,16 @@ void save_int8_calibration(const Int8Calibration& calibration, const fs::path& f
     text << YAML::Key << YAML::DoubleQuoted << tensor << YAML::Value << YAML::Flow << ranges;
   }
   text << YAML::EndMap << YAML::EndMap;
-  std::ofstream stream(file, std::ios::trunc);
+  // What was there stays until this is whole.
+  const fs::path fresh = file.string() + ".new";
+  std::ofstream stream(fresh, std::ios::trunc);
   stream << text.c_str() << "\n";
   stream.close();
-  if (!stream) {
+  std::error_code fault;
+  if (stream) fs::rename(fresh, file, fault);
+  if (!stream || fault) {
+    std::error_code ignored;
+    fs::remove(fresh, ignored);
     throw ConfigError({file.string() + ": cannot be written; check the folder and the space left"});
   }
 }

@@ -3,7 +3,9 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
@@ -28,17 +30,44 @@ constexpr double usual_body_height_m = 1.7;
 
 std::uint64_t cell_key(int x, int y) { return packed_index(x, y, 0); }
 
+/// A lidar fits between the storeys of a car park [m].
+constexpr float min_storey_gap_m = 1.8F;
+/// Paths so far one above another, on so much of the plane, are on different storeys, and no slope
+/// [m].
+constexpr float min_storey_height_m = 2.4F;
+constexpr double storey_cell_m = 6.0;
+/// Ground of nodes that goes on in one another is of one storey [m].
+constexpr double min_storey_step_m = 1.5;
+
 /// What of one tile enters the index.
 struct TileContent {
   std::vector<Eigen::Vector3f> standing_map;
-  /// Lowest ground of coarse cells, by their keys.
-  std::map<std::uint64_t, float> lowest;
+  /// Ground of coarse cells, by their keys, the lowest first.
+  std::map<std::uint64_t, std::vector<float>> floors;
 };
 
 struct Cell {
   float lowest = 0.0F;
   /// Of voxels of a ground class.
   std::optional<float> ground;
+  /// Of all voxels, and of those of a ground class, where there are storeys.
+  std::vector<float> heights, ground_heights;
+
+  /// The lowest height, and each that has a storey's gap below it.
+  static std::vector<float> floors_of(std::vector<float>& heights) {
+    std::ranges::sort(heights);
+    std::vector<float> floors;
+    for (std::size_t i = 0; i < heights.size(); ++i)
+      if (i == 0 || heights[i] - heights[i - 1] > min_storey_gap_m) floors.push_back(heights[i]);
+    return floors;
+  }
+  /// Of what the height stands on.
+  [[nodiscard]] float floor_below(const std::vector<float>& floors, float height) const {
+    float below = lowest;
+    for (const float floor : floors)
+      if (floor <= height) below = floor;
+    return below;
+  }
 };
 
 bool is_standing(SemanticClass label, float above_lowest_m) {
@@ -46,7 +75,7 @@ bool is_standing(SemanticClass label, float above_lowest_m) {
   return !is_ground(label) && !is_movable(label);
 }
 
-TileContent content_of(const Tile& tile, const LayeredCells& coarse) {
+TileContent content_of(const Tile& tile, const LayeredCells& coarse, bool has_storeys) {
   std::map<std::uint64_t, Cell> cells;
   const auto key_of = [&](const Eigen::Vector3f& p) {
     return cell_key(coarse.index(static_cast<double>(p.x())),
@@ -56,21 +85,51 @@ TileContent content_of(const Tile& tile, const LayeredCells& coarse) {
     const float z = voxel.mean_map.z();
     Cell& cell = cells.try_emplace(key_of(voxel.mean_map), Cell{z, std::nullopt}).first->second;
     cell.lowest = std::min(cell.lowest, z);
-    if (is_ground(voxel.evidence.winner())) cell.ground = std::min(cell.ground.value_or(z), z);
+    const bool is_on_ground = is_ground(voxel.evidence.winner());
+    if (is_on_ground) cell.ground = std::min(cell.ground.value_or(z), z);
+    if (has_storeys) cell.heights.push_back(z);
+    if (has_storeys && is_on_ground) cell.ground_heights.push_back(z);
   }
   TileContent content;
+  std::map<std::uint64_t, std::vector<float>> floors;
+  for (auto& [key, cell] : cells)
+    if (has_storeys) floors[key] = Cell::floors_of(cell.heights);
   bool is_labelled = false;
   for (const Voxel& voxel : tile.voxels) {
     const SemanticClass label = voxel.evidence.winner();
     is_labelled |= label != SemanticClass::unlabeled;
-    const Cell& cell = cells.at(key_of(voxel.mean_map));
-    if (is_standing(label, voxel.mean_map.z() - cell.lowest))
+    const std::uint64_t key = key_of(voxel.mean_map);
+    const float z = voxel.mean_map.z();
+    if (is_standing(label, z - cells.at(key).floor_below(floors[key], z)))
       content.standing_map.push_back(voxel.mean_map);
   }
-  for (const auto& [key, cell] : cells) {
-    if (cell.ground || !is_labelled) content.lowest[key] = cell.ground.value_or(cell.lowest);
+  for (auto& [key, cell] : cells) {
+    if (!cell.ground && is_labelled) continue;
+    content.floors[key] = {cell.ground.value_or(cell.lowest)};
+    if (has_storeys)
+      content.floors[key] = cell.ground ? Cell::floors_of(cell.ground_heights) : floors[key];
   }
   return content;
+}
+
+/// Whether the path leads over itself, by a bridge or in a car park.
+bool leads_over_itself(const SharedTrajectory& trajectory) {
+  struct Heights {
+    float low = 0.0F, high = 0.0F;
+  };
+  tsl::robin_map<std::uint64_t, Heights, IndexHash> of_cell;
+  for (const StampedPose& pose : trajectory) {
+    const Eigen::Vector3d p = pose.T_map_lidar.translation();
+    if (!p.allFinite() || p.cwiseAbs().maxCoeff() > VoxelGrid::max_coordinate_m) continue;
+    const auto z = static_cast<float>(p.z());
+    const std::uint64_t key = cell_key(static_cast<int>(std::floor(p.x() / storey_cell_m)),
+                                       static_cast<int>(std::floor(p.y() / storey_cell_m)));
+    const auto entry = of_cell.try_emplace(key, Heights{z, z}).first;
+    Heights& heights = entry.value();
+    heights = {std::min(heights.low, z), std::max(heights.high, z)};
+    if (heights.high - heights.low > min_storey_height_m) return true;
+  }
+  return false;
 }
 
 }  // namespace
@@ -82,38 +141,55 @@ PlaceIndex::PlaceIndex(std::shared_ptr<const MapSnapshot> map, const SharedTraje
       config_(config),
       coarse_(config.coarse),
       fine_(config.fine) {
-  const LowestHeights lowest = fill_cells();
-  place_nodes(trajectory, lowest);
+  has_storeys_ = leads_over_itself(trajectory);
+  const Floors floors = fill_cells();
+  place_nodes(trajectory, floors);
   place_blocks();
 }
 
-PlaceIndex::LowestHeights PlaceIndex::fill_cells() {
-  LowestHeights lowest;
+PlaceIndex::Floors PlaceIndex::fill_cells() {
+  Floors floors;
+  std::atomic<std::size_t> unread = 0;
   const std::vector<TileTable::SharedTile> all(map_->tiles.begin(), map_->tiles.end());
   // A few at a time: those that are on disk need not be in memory together.
   constexpr std::size_t portion = 64;
   for (std::size_t begin = 0; begin < all.size(); begin += portion) {
     std::vector<TileContent> contents(std::min(portion, all.size() - begin));
     tbb::parallel_for(std::size_t{0}, contents.size(), [&](std::size_t k) {
-      contents[k] = content_of(*tiles_->read(all[begin + k]), coarse_);
+      if (const auto tile = readable(all[begin + k]))
+        contents[k] = content_of(*tile, coarse_, has_storeys_);
+      else
+        ++unread;
     });
     for (const TileContent& content : contents) {
       for (const Eigen::Vector3f& p_map : content.standing_map) {
         coarse_.insert(p_map);
         fine_.insert(p_map);
       }
-      for (const auto& [key, height] : content.lowest) {
-        const auto [entry, is_new] = lowest.try_emplace(key, height);
-        if (!is_new) entry.value() = std::min(entry->second, height);
+      for (const auto& [key, heights] : content.floors) {
+        const auto [entry, is_new] = floors.lowest.try_emplace(key, heights.front());
+        if (!is_new) entry.value() = std::min(entry->second, heights.front());
+        if (heights.size() > 1) floors.higher[key].assign(heights.begin() + 1, heights.end());
       }
     }
   }
-  return lowest;
+  unread_tiles_ = unread;
+  return floors;
 }
 
-void PlaceIndex::place_nodes(const SharedTrajectory& trajectory, const LowestHeights& lowest) {
-  if (trajectory.empty()) return place_nodes_on_ground(lowest);
-  tsl::robin_map<std::uint64_t, bool, IndexHash> taken;
+std::shared_ptr<const Tile> PlaceIndex::readable(const TileTable::SharedTile& tile) const {
+  try {
+    return tiles_->read(tile);
+  } catch (const TileChanged&) {
+    throw;
+  } catch (const std::runtime_error&) {
+    return nullptr;
+  }
+}
+
+void PlaceIndex::place_nodes(const SharedTrajectory& trajectory, const Floors& floors) {
+  if (trajectory.empty()) return place_nodes_on_ground(floors);
+  tsl::robin_map<std::uint64_t, std::vector<float>, IndexHash> taken;
   std::vector<float> path_heights_m;
   for (const StampedPose& pose : trajectory) {
     const Eigen::Vector3d p = pose.T_map_lidar.translation();
@@ -121,26 +197,45 @@ void PlaceIndex::place_nodes(const SharedTrajectory& trajectory, const LowestHei
     const auto index = [&](double m) {
       return static_cast<int>(std::floor(m / config_.node_spacing_m));
     };
-    if (!taken.try_emplace(cell_key(index(p.x()), index(p.y())), true).second) continue;
+    const auto height = static_cast<float>(p.z());
+    std::vector<float>& heights = taken[cell_key(index(p.x()), index(p.y()))];
+    const bool is_taken = std::ranges::any_of(heights, [&](float known) {
+      return !has_storeys_ || std::abs(known - height) < min_storey_height_m;
+    });
+    if (is_taken) continue;
+    heights.push_back(height);
     nodes_.push_back({p.head<2>(), {}, 0.0});
-    path_heights_m.push_back(static_cast<float>(p.z()));
+    path_heights_m.push_back(height);
   }
-  fit_ground(lowest, path_heights_m);
+  fit_ground(floors, path_heights_m);
 }
 
-void PlaceIndex::place_nodes_on_ground(const LowestHeights& lowest) {
+void PlaceIndex::place_nodes_on_ground(const Floors& floors) {
   std::vector<float> path_heights_m;
   const int step = std::max(1, static_cast<int>(config_.node_spacing_m / config_.coarse.cell_m));
-  for (const auto& [key, height] : lowest) {
+  for (const auto& [key, height] : floors.lowest) {
     const auto [x, y, z] = unpacked_index(key);
     if (x % step != 0 || y % step != 0) continue;
     nodes_.push_back({config_.coarse.cell_m * Eigen::Vector2d(x + 0.5, y + 0.5), {}, 0.0});
     path_heights_m.push_back(height + static_cast<float>(usual_body_height_m));
   }
-  fit_ground(lowest, path_heights_m);
+  fit_ground(floors, path_heights_m);
 }
 
-void PlaceIndex::fit_ground(const LowestHeights& lowest, const std::vector<float>& path_heights_m) {
+std::optional<float> PlaceIndex::Floors::below(std::uint64_t cell, float path_height_m) const {
+  const auto entry = lowest.find(cell);
+  if (entry == lowest.end()) return std::nullopt;
+  float ground_m = entry->second;
+  if (const auto above = higher.find(cell); above != higher.end()) {
+    for (const float floor_m : above->second)
+      if (floor_m - path_height_m <= max_ground_above_m) ground_m = floor_m;
+  }
+  const float below_m = path_height_m - ground_m;
+  if (below_m > max_ground_below_m || below_m < -max_ground_above_m) return std::nullopt;
+  return ground_m;
+}
+
+void PlaceIndex::fit_ground(const Floors& floors, const std::vector<float>& path_heights_m) {
   std::vector<std::uint8_t> is_fitted(nodes_.size(), 0);
   const int radius = static_cast<int>(ground_radius_m / config_.coarse.cell_m);
   tbb::parallel_for(std::size_t{0}, nodes_.size(), [&](std::size_t k) {
@@ -150,13 +245,11 @@ void PlaceIndex::fit_ground(const LowestHeights& lowest, const std::vector<float
     std::vector<Eigen::Vector3f> around;
     for (int y = node_y - radius; y <= node_y + radius; ++y) {
       for (int x = node_x - radius; x <= node_x + radius; ++x) {
-        const auto entry = lowest.find(cell_key(x, y));
-        if (entry == lowest.end()) continue;
-        const float below_m = path_heights_m[k] - entry->second;
-        if (below_m > max_ground_below_m || below_m < -max_ground_above_m) continue;
+        const auto ground_m = floors.below(cell_key(x, y), path_heights_m[k]);
+        if (!ground_m) continue;
         const Eigen::Vector2d centre = config_.coarse.cell_m * Eigen::Vector2d(x + 0.5, y + 0.5);
         const Eigen::Vector2f from_node = (centre - position_map).cast<float>();
-        around.emplace_back(from_node.x(), from_node.y(), entry->second);
+        around.emplace_back(from_node.x(), from_node.y(), *ground_m);
       }
     }
     const auto ground = fit_level_plane(around, max_slope, min_ground_share);
@@ -178,42 +271,80 @@ void PlaceIndex::fit_ground(const LowestHeights& lowest, const std::vector<float
   }
 }
 
+Eigen::Vector2d PlaceIndex::middle_of(const Block& block) const {
+  return config_.coarse.cell_m *
+         Eigen::Vector2d(block.first_x + 0.5 * block_width, block.first_y + 0.5 * block_height);
+}
+
 void PlaceIndex::place_blocks() {
-  std::map<std::pair<int, int>, std::size_t> block_of;
-  std::vector<double> nearest_m;
   const double cell_m = config_.coarse.cell_m;
   const int reach = static_cast<int>(std::ceil(config_.corridor_m / cell_m));
-  const auto block_at = [&](int x, int y) -> Block& {
-    const auto column = static_cast<int>(std::floor(static_cast<double>(x) / block_width));
-    const auto row = static_cast<int>(std::floor(static_cast<double>(y) / block_height));
-    const auto [entry, is_new] = block_of.try_emplace({row, column}, blocks_.size());
-    if (is_new) {
-      blocks_.push_back({column * block_width, row * block_height, {}, 0});
-      blocks_.back().is_searched.assign(std::size_t{block_width} * block_height, 0);
-      nearest_m.push_back(1e9);
-    }
-    return blocks_[entry->second];
+  const auto part = [](int index, int side) {
+    return static_cast<int>(std::floor(static_cast<double>(index) / side));
   };
+  // By row and column, the nodes that a place of the block is near to.
+  std::map<std::pair<int, int>, std::vector<std::uint32_t>> nodes_of;
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    const int x = coarse_.index(nodes_[k].position_map.x());
+    const int y = coarse_.index(nodes_[k].position_map.y());
+    for (int row = part(y - reach, block_height); row <= part(y + reach, block_height); ++row)
+      for (int column = part(x - reach, block_width); column <= part(x + reach, block_width);
+           ++column)
+        nodes_of[{row, column}].push_back(static_cast<std::uint32_t>(k));
+  }
+  for (const auto& [place, nodes] : nodes_of) {
+    Block empty{place.second * block_width, place.first * block_height, {}, 0};
+    empty.is_searched.assign(std::size_t{block_width} * block_height, 0);
+    for (const std::vector<std::uint32_t>& storey : storeys_of(nodes, middle_of(empty)))
+      place_block(empty, storey);
+  }
+}
+
+std::vector<std::vector<std::uint32_t>> PlaceIndex::storeys_of(
+    std::vector<std::uint32_t> nodes, const Eigen::Vector2d& middle_map) const {
+  if (!has_storeys_) return {std::move(nodes)};
+  const auto ground_m = [&](std::uint32_t k) {
+    return nodes_[k].ground.at(middle_map - nodes_[k].position_map);
+  };
+  std::ranges::stable_sort(nodes, {}, ground_m);
+  std::vector<std::vector<std::uint32_t>> storeys;
+  for (const std::uint32_t k : nodes) {
+    const bool is_above =
+        storeys.empty() || ground_m(k) - ground_m(storeys.back().back()) > min_storey_step_m;
+    if (is_above) storeys.emplace_back();
+    storeys.back().push_back(k);
+  }
+  return storeys;
+}
+
+void PlaceIndex::place_block(Block block, const std::vector<std::uint32_t>& nodes) {
+  const double cell_m = config_.coarse.cell_m;
+  const int reach = static_cast<int>(std::ceil(config_.corridor_m / cell_m));
+  bool is_reached = false;
+  double nearest_m = std::numeric_limits<double>::infinity();
+  for (const std::uint32_t k : nodes) {
     const Eigen::Vector2d& position_map = nodes_[k].position_map;
-    const int node_x = coarse_.index(position_map.x());
-    const int node_y = coarse_.index(position_map.y());
-    for (int y = node_y - reach; y <= node_y + reach; ++y) {
-      for (int x = node_x - reach; x <= node_x + reach; ++x) {
-        const Eigen::Vector2d centre = cell_m * Eigen::Vector2d(x + 0.5, y + 0.5);
+    const int near_x = coarse_.index(position_map.x()) - block.first_x;
+    const int near_y = coarse_.index(position_map.y()) - block.first_y;
+    bool reaches = false;
+    for (int y = std::max(0, near_y - reach); y <= std::min(block_height - 1, near_y + reach);
+         ++y) {
+      for (int x = std::max(0, near_x - reach); x <= std::min(block_width - 1, near_x + reach);
+           ++x) {
+        const Eigen::Vector2d centre =
+            cell_m * Eigen::Vector2d(block.first_x + x + 0.5, block.first_y + y + 0.5);
         if ((centre - position_map).norm() > config_.corridor_m) continue;
-        Block& block = block_at(x, y);
-        block.is_searched[static_cast<std::size_t>((y - block.first_y) * block_width +
-                                                   (x - block.first_x))] = 1;
-        const Eigen::Vector2d middle = cell_m * Eigen::Vector2d(block.first_x + 0.5 * block_width,
-                                                                block.first_y + 0.5 * block_height);
-        double& nearest = nearest_m[static_cast<std::size_t>(&block - blocks_.data())];
-        if ((middle - position_map).norm() >= nearest) continue;
-        nearest = (middle - position_map).norm();
-        block.node = static_cast<std::uint32_t>(k);
+        block.is_searched[static_cast<std::size_t>(y * block_width + x)] = 1;
+        reaches = true;
       }
     }
+    is_reached |= reaches;
+    const double distance_m = (middle_of(block) - position_map).norm();
+    if (!reaches || distance_m >= nearest_m) continue;
+    nearest_m = distance_m;
+    block.node = k;
   }
+  if (is_reached) blocks_.push_back(std::move(block));
 }
 
 std::vector<LabelledPoint> PlaceIndex::points_near(const Eigen::Vector2d& position_map,
@@ -226,7 +357,8 @@ std::vector<LabelledPoint> PlaceIndex::points_near(const Eigen::Vector2d& positi
   tbb::parallel_for(std::size_t{0}, near.size(), [&](std::size_t k) {
     const Eigen::Vector2f centre_map = position_map.cast<float>();
     const auto radius = static_cast<float>(radius_m);
-    const auto tile = tiles_->read(near[k]);
+    const auto tile = readable(near[k]);
+    if (tile == nullptr) return;
     for (const PackedVoxel& voxel : tile->voxels.packed()) {
       const Eigen::Vector3f p = mean_map(voxel, tile->info.id, tile->voxels.grid());
       if ((p.head<2>() - centre_map).squaredNorm() < radius * radius)

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/lidar/shared_trajectory.hpp"
@@ -41,7 +42,7 @@ class PlaceIndex {
   /// Cells of a block that is searched as one: rows of `block_width`.
   static constexpr int block_width = 32;
   static constexpr int block_height = 16;
-  /// A part of the plane where a lidar may be.
+  /// A part of the plane where a lidar may be, on one storey where the path leads over itself.
   struct Block {
     /// Its lowest cell, in coarse cells.
     int first_x = 0;
@@ -52,7 +53,7 @@ class PlaceIndex {
     std::uint32_t node = 0;
   };
 
-  /// Without a trajectory a lidar may be wherever the map has ground. Throws what `tiles` throws.
+  /// Without a trajectory a lidar may be wherever the map has ground. Throws TileChanged.
   PlaceIndex(std::shared_ptr<const MapSnapshot> map, const SharedTrajectory& trajectory,
              std::shared_ptr<TileReader> tiles, const PlaceIndexConfig& config = {});
 
@@ -67,24 +68,43 @@ class PlaceIndex {
   /// tiles' store throws.
   [[nodiscard]] std::vector<LabelledPoint> points_near(const Eigen::Vector2d& position_map,
                                                        double radius_m) const;
+  /// Tiles that could not be read: nothing is looked for there.
+  [[nodiscard]] std::size_t unread_tiles() const { return unread_tiles_; }
   /// Of the index itself.
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  using LowestHeights = tsl::robin_map<std::uint64_t, float, IndexHash>;
+  /// Heights of the ground of coarse cells, by their keys.
+  struct Floors {
+    tsl::robin_map<std::uint64_t, float, IndexHash> lowest;
+    /// Those of the storeys above it, the lowest first.
+    tsl::robin_map<std::uint64_t, std::vector<float>, IndexHash> higher;
 
-  /// Fills the cells; the lowest ground of each coarse cell comes back.
-  [[nodiscard]] LowestHeights fill_cells();
-  void place_nodes(const SharedTrajectory& trajectory, const LowestHeights& lowest);
-  void place_nodes_on_ground(const LowestHeights& lowest);
-  void fit_ground(const LowestHeights& lowest, const std::vector<float>& path_heights_m);
+    /// What a path of this height leads over; nothing where that is too far from it.
+    [[nodiscard]] std::optional<float> below(std::uint64_t cell, float path_height_m) const;
+  };
+
+  /// Fills the cells; the ground comes back.
+  [[nodiscard]] Floors fill_cells();
+  /// Null where the tile is damaged. Throws TileChanged.
+  [[nodiscard]] std::shared_ptr<const Tile> readable(const TileTable::SharedTile& tile) const;
+  void place_nodes(const SharedTrajectory& trajectory, const Floors& floors);
+  void place_nodes_on_ground(const Floors& floors);
+  void fit_ground(const Floors& floors, const std::vector<float>& path_heights_m);
   void place_blocks();
+  /// Nodes by the storey that they are on.
+  [[nodiscard]] std::vector<std::vector<std::uint32_t>> storeys_of(
+      std::vector<std::uint32_t> nodes, const Eigen::Vector2d& middle_map) const;
+  void place_block(Block block, const std::vector<std::uint32_t>& nodes);
+  [[nodiscard]] Eigen::Vector2d middle_of(const Block& block) const;
 
   std::shared_ptr<const MapSnapshot> map_;
   std::shared_ptr<TileReader> tiles_;
   PlaceIndexConfig config_;
   LayeredCells coarse_;
   LayeredCells fine_;
+  bool has_storeys_ = false;
+  std::size_t unread_tiles_ = 0;
   std::vector<PathNode> nodes_;
   std::vector<Block> blocks_;
 };

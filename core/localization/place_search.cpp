@@ -259,6 +259,9 @@ class FineSearch {
   std::vector<Eigen::Vector3f> landmarks_;
 };
 
+/// Places of another storey are others [m].
+constexpr double storey_spacing_m = 1.5;
+
 bool is_better(const PlaceCandidate& a, const PlaceCandidate& b) {
   if (a.score != b.score) return a.score > b.score;
   if (a.position_map.x() != b.position_map.x()) return a.position_map.x() < b.position_map.x();
@@ -266,8 +269,13 @@ bool is_better(const PlaceCandidate& a, const PlaceCandidate& b) {
   return a.heading_rad < b.heading_rad;
 }
 
+double ground_m(const PlaceCandidate& candidate, const PlaceIndex& index) {
+  const PathNode& node = index.nodes()[candidate.node];
+  return node.ground.at(candidate.position_map - node.position_map);
+}
+
 std::vector<PlaceCandidate> spread(std::vector<PlaceCandidate> all, std::size_t count,
-                                   const PlaceSearchConfig& config) {
+                                   const PlaceIndex& index, const PlaceSearchConfig& config) {
   std::ranges::sort(all, is_better);
   std::vector<PlaceCandidate> kept;
   for (const PlaceCandidate& c : all) {
@@ -275,7 +283,8 @@ std::vector<PlaceCandidate> spread(std::vector<PlaceCandidate> all, std::size_t 
     const bool is_near = std::ranges::any_of(kept, [&](const PlaceCandidate& k) {
       const double turn = std::remainder(c.heading_rad - k.heading_rad, 2.0 * std::numbers::pi);
       return (c.position_map - k.position_map).norm() < config.spacing_m &&
-             std::abs(turn) < config.spacing_rad;
+             std::abs(turn) < config.spacing_rad &&
+             std::abs(ground_m(c, index) - ground_m(k, index)) < storey_spacing_m;
     });
     if (!is_near) kept.push_back(c);
   }
@@ -295,12 +304,12 @@ std::vector<PlaceCandidate> search_places(const LocalizationQuery& query, const 
                                           std::size_t count, const PlaceSearchConfig& config,
                                           const std::optional<SearchRegion>& region) {
   if (index.empty() || query.landmarks_foot.empty()) return {};
-  std::vector<PlaceCandidate> places =
-      spread(CoarseSearch(query, index, config, region).run(), config.coarse_candidates, config);
+  std::vector<PlaceCandidate> places = spread(CoarseSearch(query, index, config, region).run(),
+                                              config.coarse_candidates, index, config);
   const FineSearch fine(query, index, config);
   tbb::parallel_for(std::size_t{0}, places.size(),
                     [&](std::size_t k) { places[k] = fine.refine(places[k]); });
-  return spread(std::move(places), count, config);
+  return spread(std::move(places), count, index, config);
 }
 
 Eigen::Isometry3d T_map_upright(const PlaceCandidate& candidate, const LocalizationQuery& query,

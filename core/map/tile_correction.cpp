@@ -11,6 +11,9 @@
 namespace stillmap {
 namespace {
 
+/// Means of voxels have steps of 1/256 of them.
+constexpr double min_shift_voxels = 0.02;
+
 constexpr std::uint32_t max_count = std::numeric_limits<std::uint16_t>::max();
 
 std::uint16_t capped_sum(std::uint16_t a, std::uint16_t b) {
@@ -46,7 +49,10 @@ std::optional<Eigen::Vector3d> TileCorrection::new_position(const Eigen::Vector3
   const Eigen::Isometry3d* const T_new_old = correction_.at(stamps_.stamp_ns(scan));
   if (T_new_old == nullptr) return std::nullopt;
   const Eigen::Vector3d moved = *T_new_old * position_map;
-  if ((moved - position_map).norm() < 0.5 * grid_.voxel_size_m() || !grid_.holds(moved))
+  // Poses that are to stay have the identity. What was seen from the others goes along with them,
+  // however near it lies, or it would stay behind with every correction.
+  if ((moved - position_map).norm() < min_shift_voxels * grid_.voxel_size_m() ||
+      !grid_.holds(moved))
     return std::nullopt;
   if (!is_open_(grid_.index(moved).tile)) return std::nullopt;
   return moved;

@@ -38,6 +38,9 @@ float remission_factor(std::span<const float> intensity, const InputStatistics& 
   return is_usual || usual <= 0.0F ? 1.0F : usual / bright;
 }
 
+/// Scans of the usual scale have no more.
+constexpr float max_remission = 1.0F;
+
 }  // namespace
 
 std::vector<float> make_network_input(const Scan& scan, const RangeImage& image,
@@ -57,8 +60,12 @@ std::vector<float> make_network_input(const Scan& scan, const RangeImage& image,
     if (nearest == RangeImage::none || (model.mask_first_point && nearest == 0)) continue;
     const auto point = static_cast<std::size_t>(nearest);
     const Eigen::Vector3f& p_lidar = scan.points_lidar[point];
-    const float remission = has_remission ? factor * scan.intensity[point]
-                                          : statistics.mean[index(InputChannel::remission)];
+    // Of another scale, retro-reflectors would be brighter than anything that was learned. NaN
+    // stays.
+    const float remission = !has_remission ? statistics.mean[index(InputChannel::remission)]
+                            : factor == 1.0F
+                                ? scan.intensity[point]
+                                : std::min(factor * scan.intensity[point], max_remission);
     const std::array<float, max_input_channels> values{image.range_m()[pixel],
                                                        p_lidar.x(),
                                                        p_lidar.y(),

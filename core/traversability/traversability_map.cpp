@@ -154,7 +154,7 @@ struct TraversabilityMap::State {
   std::vector<std::shared_ptr<const TraversabilityView>> views;
 
   void set_map(const MapSnapshot& map);
-  [[nodiscard]] ChangedCells update_columns(const MapSnapshot& map,
+  [[nodiscard]] ChangedCells update_columns(const MapSnapshot& map, TraversabilityUpdate& report,
                                             const ThrottleCallback& throttle, TileReader* reader);
   [[nodiscard]] std::vector<std::shared_ptr<const Tile>> renewed_tiles(
       const MapSnapshot& map) const;
@@ -205,6 +205,7 @@ void TraversabilityMap::State::drop_missing(const MapSnapshot& map, ChangedCells
 }
 
 ChangedCells TraversabilityMap::State::update_columns(const MapSnapshot& map,
+                                                      TraversabilityUpdate& report,
                                                       const ThrottleCallback& throttle,
                                                       TileReader* reader) {
   ChangedCells changes;
@@ -217,7 +218,10 @@ ChangedCells TraversabilityMap::State::update_columns(const MapSnapshot& map,
       columns[i] = std::make_shared<const ColumnTile>(make_columns(*tile, side));
   });
   for (std::size_t i = 0; i < renewed.size(); ++i) {
-    if (columns[i] == nullptr) continue;
+    if (columns[i] == nullptr) {
+      ++report.unread_tiles;
+      continue;
+    }
     const TileInfo& info = renewed[i]->info;
     TileState& state = tiles[info.id];
     note_change(changes, info.id, state.columns.get(), columns[i].get());
@@ -323,7 +327,7 @@ TraversabilityUpdate TraversabilityMap::update(const MapSnapshot& map,
   state_->set_map(map);
   TraversabilityUpdate report;
   if (!map.tiles.empty()) {
-    const ChangedCells columns = state_->update_columns(map, throttle, tiles);
+    const ChangedCells columns = state_->update_columns(map, report, throttle, tiles);
     report.map_tiles = columns.size();
     const ChangedCells surfaces = state_->update_surfaces(columns, report, throttle);
     state_->classify_all(surfaces, report, throttle);

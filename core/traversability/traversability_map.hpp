@@ -16,6 +16,8 @@ namespace stillmap {
 struct TraversabilityUpdate {
   /// Changed, new and removed tiles of the map.
   std::size_t map_tiles = 0;
+  /// Tiles that could not be read, and stay as they were.
+  std::size_t unread_tiles = 0;
   /// Tiles whose surface was recomputed: changed tiles and the neighbours that they influence.
   std::size_t surfaces = 0;
   /// Tiles that were reclassified, summed over all profiles.

@@ -52,8 +52,13 @@ std::shared_ptr<const Localizer> SearchableMap::localizer() {
   localizer_.reset();
   // The reader outlives the index, and whoever uses it.
   const std::shared_ptr<TileReader> tiles(std::shared_ptr<void>(), &tiles_);
-  localizer_ = std::make_shared<const Localizer>(
-      std::make_shared<const PlaceIndex>(view, latest_map_.trajectory(), tiles));
+  auto index = std::make_shared<const PlaceIndex>(view, latest_map_.trajectory(), tiles);
+  if (const std::size_t unread = index->unread_tiles(); unread > 0) {
+    throttled_log_.warn("place_search", std::to_string(unread) +
+                                            " tiles of the map cannot be read: the robot is not "
+                                            "looked for there");
+  }
+  localizer_ = std::make_shared<const Localizer>(std::move(index));
   map_id_ = view->map_id;
   map_version_ = view->version;
   corrections_ = corrections;
@@ -167,9 +172,10 @@ void PlaceFinder::map_corrected() {
   const std::scoped_lock lock(mutex_);
   std::optional<PlaceGuess> guess = guess_;
   if (found_ && last_.scan) {
-    guess = PlaceGuess{
-        .T_map_base = found_->T_map_odom * found_->odometry.predict(last_.scan->scan.stamp_ns),
-        .radius_m = applied_radius_m};
+    guess = PlaceGuess{.T_map_base = found_->T_map_odom *
+                                     found_->odometry.predict(last_.scan->scan.stamp_ns) *
+                                     last_.T_base_lidar.inverse(),
+                       .radius_m = applied_radius_m};
   }
   if (guess) return begin_search(guess);
   end_search();
@@ -241,7 +247,8 @@ void PlaceFinder::handle(const LostScan& lost) {
 }
 
 bool PlaceFinder::is_due() {
-  return localization_->scans_tried() < eager_searches || Clock::now() - searched_ >= pause;
+  const bool is_eager = failed_searches_ == 0 && localization_->scans_tried() < eager_searches;
+  return is_eager || Clock::now() - searched_ >= pause;
 }
 
 GlobalLocalization::Regions PlaceFinder::regions(const LostScan& lost) const {
@@ -264,14 +271,24 @@ void PlaceFinder::look_for(const LostScan& lost) {
     const Outcome outcome =
         localization_->search(*map_.localizer(), lost.T_base_lidar.linear(), regions(lost));
     searched_ = Clock::now();
+    failed_searches_ = 0;
     statistics_.add_latency("place_search", milliseconds_since(began));
     report(outcome, lost);
   } catch (const std::exception& fault) {
     // Tiles that changed or cannot be read: the map is made searchable anew.
     map_.discard();
-    throttled_log_.warn("place_search", std::string("the map cannot be searched: ") + fault.what());
-    statistics_.set_place_search(std::string("the map cannot be searched for its place: ") +
-                                 fault.what());
+    searched_ = Clock::now();
+    ++failed_searches_;
+    const std::string text = std::string("the map cannot be searched: ") + fault.what();
+    throttled_log_.warn("place_search", text);
+    bool is_guess = false;
+    {
+      const std::scoped_lock lock(mutex_);
+      if (lost.search != search_) return;
+      is_guess = guess_.has_value();
+      statistics_.set_place_search(text);
+    }
+    if (is_guess && failed_searches_ >= scans_of_guess) give_up_guess(lost.search, text);
   }
 }
 
@@ -299,7 +316,7 @@ void PlaceFinder::report(Outcome outcome, const LostScan& lost) {
   const bool is_open = outcome == Outcome::found || outcome == Outcome::confirming;
   if (is_guess && !is_open && localization_->scans_tried() >= scans_of_guess)
     return give_up_guess(lost.search, text);
-  if (!is_guess) throttled_log_.warn("lost", "lost; looking for its place in the map: " + text);
+  if (!is_guess) throttled_log_.warn("lost", "looking for its place in the map: " + text);
 }
 
 void PlaceFinder::take_place(const LostScan& lost) {

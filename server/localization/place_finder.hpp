@@ -48,6 +48,7 @@ class SearchableMap {
   std::uint64_t corrections_ = 0;
   std::chrono::steady_clock::time_point built_;
   std::chrono::steady_clock::time_point used_;
+  ThrottledLog throttled_log_;
 };
 
 /// Of a mapper beside a place finder: its own wide searches take seconds, in which no live scan is
@@ -145,6 +146,8 @@ class PlaceFinder {
   std::optional<GlobalLocalization> localization_;
   std::uint64_t localized_search_ = 0;
   std::chrono::steady_clock::time_point searched_;
+  /// In a row, as the map could not be read.
+  int failed_searches_ = 0;
   int followed_scans_ = 0;
   ThrottledLog throttled_log_;
   BoundedQueue<LostScan> scans_;

@@ -138,6 +138,12 @@ std::optional<MapOnEarth> LoopCorrector::take_place() {
   return std::exchange(place_, std::nullopt)->place;
 }
 
+bool LoopCorrector::take_withdrawal() {
+  const std::scoped_lock lock(mutex_);
+  const std::uint64_t map = std::exchange(withdrawn_map_, 0);
+  return map != 0 && map == run_.map;
+}
+
 bool LoopCorrector::is_off_earlier_map() {
   const std::scoped_lock lock(mutex_);
   if (is_clock_set_back_) return false;
@@ -192,6 +198,7 @@ void LoopCorrector::close(const ScanOfMap& scan, bool enters) {
   if (std::exchange(closed_map_, map) != map) {
     closer_.emplace(closer_for(scan.run));
     reported_ = reported_anchors_ = reported_placed_ = reported_misplaced_ = handed_on_submaps_ = 0;
+    had_place_ = false;
   }
   const auto began = std::chrono::steady_clock::now();
   const bool had_ended = !closer_->end_reason().empty();
@@ -203,8 +210,8 @@ void LoopCorrector::close(const ScanOfMap& scan, bool enters) {
   report_fixes();
   report_closures();
   hand_on_submaps(map);
+  hand_on_place(map);
   const std::scoped_lock lock(mutex_);
-  if (const auto place = closer_->on_earth()) place_ = Place{map, *place, closer_->corrections()};
   off_earlier_map_ = {map, closer_->is_off_earlier_map(), closer_->corrections()};
   if (closer_->is_full()) full_ = {map, closer_->corrections()};
   if (!correction) return;
@@ -250,19 +257,29 @@ void LoopCorrector::hand_on_fixes(const Run& run) {
   for (const GnssFix& fix : fixes) {
     const std::size_t origins = closer_->gnss().origins();
     const std::string refusal = closer_->add(fix);
-    if (origins > 0 && closer_->gnss().origins() != origins) withdraw_place();
+    if (origins > 0 && closer_->gnss().origins() != origins) {
+      spdlog::warn(
+          "GNSS: the fixes until now are dropped, as more that followed them lie together more "
+          "than "
+          "50 km away");
+    }
     if (refusal.empty()) continue;
     statistics_.count("gnss_fixes_refused");
     throttled_log_.warn("gnss", "a GNSS fix is not used: " + refusal);
   }
 }
 
-void LoopCorrector::withdraw_place() {
-  spdlog::warn(
-      "GNSS: the fixes until now are dropped, as more that followed them lie together more than "
-      "50 km away");
+void LoopCorrector::hand_on_place(std::uint64_t map) {
+  const auto place = closer_->on_earth();
+  const bool had_place = std::exchange(had_place_, place.has_value());
   const std::scoped_lock lock(mutex_);
-  place_.reset();
+  if (place) {
+    place_ = Place{map, *place, closer_->corrections()};
+  } else if (had_place) {
+    // Other fixes than those that it was found by are believed.
+    place_.reset();
+    withdrawn_map_ = map;
+  }
 }
 
 void LoopCorrector::report_fixes() {

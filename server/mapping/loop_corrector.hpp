@@ -72,6 +72,8 @@ class LoopCorrector {
   /// Where the map lies, when that was found out or found out better; once, and only as the map is:
   /// not between a correction and its report.
   [[nodiscard]] std::optional<MapOnEarth> take_place();
+  /// Whether the place that was taken last is none any more; once.
+  [[nodiscard]] bool take_withdrawal();
   /// Whether odometry may have drifted away from what was there before the run: as LoopCloser, and
   /// only as the map is.
   [[nodiscard]] bool is_off_earlier_map();
@@ -113,8 +115,7 @@ class LoopCorrector {
   void close(const ScanOfMap& scan, bool enters);
   [[nodiscard]] LiveLoopCloser closer_for(const Run& run) const;
   void hand_on_fixes(const Run& run);
-  /// Another origin of the fixes was found.
-  void withdraw_place();
+  void hand_on_place(std::uint64_t map);
   void report_fixes();
   void report_closures();
   void count_new(const char* counter, std::size_t now, std::size_t& reported);
@@ -171,12 +172,16 @@ class LoopCorrector {
     std::uint64_t graph_revision = 0;
   };
   std::optional<Full> full_;
+  /// Of which map the place is none any more.
+  std::uint64_t withdrawn_map_ = 0;
   std::vector<GnssFix> fixes_;
 
   // Of the worker.
   std::uint64_t closed_map_ = 0;
   /// That a fix was last refused for, as it is not this run's alone.
   std::uint64_t map_without_fixes_ = 0;
+  /// Of the map that is looked at, it was known.
+  bool had_place_ = false;
   std::optional<LiveLoopCloser> closer_;
   /// Of the map that is looked at; those that stay out between them are left out.
   WaitingScans<ScanOfMap> waiting_;

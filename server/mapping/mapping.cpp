@@ -82,6 +82,7 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
       .occupancy = context.occupancy,
       .place_finder = &place_finder_,
       .loops = loops_ ? &*loops_ : nullptr,
+      .tiles = &storage_.tiles(),
       .earth = earth_ ? &*earth_ : nullptr,
       .submaps = submaps_ ? &*submaps_ : nullptr,
       .throttle = &context.throttle,
@@ -103,15 +104,11 @@ void Mapping::stop() {
 
 void Mapping::reset(std::uint64_t map_id, const std::shared_ptr<TileStore>& tile_store) {
   thread_->reset(map_id, tile_store);
-  storage_.tiles().use_tile_store(tile_store);
 }
 
 std::function<void()> Mapping::prepare(const SavedMap& map,
                                        const std::shared_ptr<TileStore>& tile_store) {
-  return [this, tile_store, replace = thread_->prepare(map, tile_store)] {
-    replace();
-    storage_.tiles().use_tile_store(tile_store);
-  };
+  return thread_->prepare(map, tile_store);
 }
 
 }  // namespace stillmap::server

@@ -149,6 +149,8 @@ ResumedMap MappingThread::resumed(const SavedMap& stored,
 void MappingThread::exchange(PreparedMap& prepared) {
   tile_store_ = std::move(prepared.tile_store);
   prepared.map = mapper_.resume(std::move(prepared.map));
+  // Before anybody hears of the map whose tiles are there.
+  if (outputs_.tiles != nullptr) outputs_.tiles->use_tile_store(tile_store_);
   begin_map(std::move(prepared.path), prepared.seen_until_ns);
 }
 
@@ -181,6 +183,7 @@ void MappingThread::set_elsewhere() {
 
 void MappingThread::close_loops() {
   if (outputs_.loops == nullptr || is_map_frozen_) return;
+  if (outputs_.loops->take_withdrawal() && outputs_.earth != nullptr) outputs_.earth->forget();
   if (const auto place = outputs_.loops->take_place(); place && outputs_.earth != nullptr)
     outputs_.earth->publish(latest_map_.newest_pose().stamp_ns, *place);
   if (const auto submaps = outputs_.loops->take_submaps()) publish_submaps(*submaps);
@@ -330,7 +333,7 @@ void MappingThread::map(QueuedScan queued) {
   imu_report_.update(mapper_.inertial());
   const bool unlabelled = mapped->labelled.labels.empty();
   latest_map_.add_pose({stamp_ns, T_map_base(mapped->odometry)}, mapped->odometry.health,
-                       unlabelled ? "none" : mapper_.label_source());
+                       unlabelled ? "none" : mapper_.label_source(), mapped->odometry.map_entry);
   if (outputs_.place_finder != nullptr)
     outputs_.place_finder->update(stamp_ns, mapped->odometry, mapper_);
   if (mapped->odometry.is_beyond_limits) statistics_.count("poses_beyond_motion_limits");

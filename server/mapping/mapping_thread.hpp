@@ -46,6 +46,8 @@ struct MappingOutputs {
   OccupancyThread* occupancy = nullptr;
   PlaceFinder* place_finder = nullptr;
   LoopCorrector* loops = nullptr;
+  /// Who reads the latest map's tiles.
+  TileReader* tiles = nullptr;
   EarthFrame* earth = nullptr;
   SubmapPublisher* submaps = nullptr;
   BackgroundThrottle* throttle = nullptr;

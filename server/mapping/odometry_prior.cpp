@@ -16,6 +16,9 @@ constexpr std::size_t max_poses = 1000;
 constexpr std::int64_t max_ahead_ns = 100'000'000;
 // where its poses came no farther apart than this.
 constexpr std::int64_t max_gap_ns = 250'000'000;
+// No robot goes so far meanwhile.
+constexpr double max_way_m = 0.2;
+constexpr double max_speed_m_s = 40.0;
 // The next pose of an odometry comes sooner.
 constexpr std::int64_t max_step_ns = 5'000'000'000;
 // So many poses in a row, each after the other, are of the odometry's clock, whatever the poses
@@ -48,8 +51,12 @@ Eigen::Isometry3d carried_on(const std::deque<StampedPose>& poses, std::int64_t 
   const StampedPose& before = *std::prev(after);
   if (after->stamp_ns - before.stamp_ns > max_gap_ns) return newest.T_map_lidar;
   const Eigen::Isometry3d T_odom_earlier = between(before, *after, earlier_ns);
-  const Eigen::Isometry3d carried =
-      newest.T_map_lidar * (T_odom_earlier.inverse() * newest.T_map_lidar);
+  const Eigen::Isometry3d T_earlier_newest = T_odom_earlier.inverse() * newest.T_map_lidar;
+  // Where an odometry set itself elsewhere, that is no motion.
+  const double way_m = T_earlier_newest.translation().norm();
+  if (way_m > max_way_m + 1e-9 * static_cast<double>(ahead_ns) * max_speed_m_s)
+    return newest.T_map_lidar;
+  const Eigen::Isometry3d carried = newest.T_map_lidar * T_earlier_newest;
   return carried.matrix().allFinite() ? carried : newest.T_map_lidar;
 }
 
@@ -102,12 +109,16 @@ void OdometryPrior::add(const nav_msgs::msg::Odometry& message) {
   const auto odometry = wire::from_odometry(message);
   if (!odometry) return;
   const std::scoped_lock lock(mutex_);
+  // tf2 knows none with a '/' at its front, which drivers of old send.
+  const auto name = [](const std::string& frame) {
+    return frame.substr(frame.starts_with('/') ? 1 : 0);
+  };
+  const std::string odom_frame = name(message.header().frame_id());
+  const std::string frame = name(message.child_frame_id());
   // There is no motion from a pose of one frame to that of another.
-  const bool is_same =
-      message.child_frame_id() == frame_ && message.header().frame_id() == odom_frame_;
-  if (!is_same) poses_ = {};
-  odom_frame_ = message.header().frame_id();
-  frame_ = message.child_frame_id();
+  if (frame != frame_ || odom_frame != odom_frame_) poses_ = {};
+  odom_frame_ = odom_frame;
+  frame_ = frame;
   if (!poses_.add(odometry->pose)) statistics_.count("odometry_prior_out_of_order");
 }
 

@@ -23,6 +23,8 @@ void LatestMap::begin(std::shared_ptr<const MapSnapshot> view, SharedTrajectory 
   changed_.notify_all();
   trajectory_ = std::move(trajectory);
   session_begin_ = trajectory_.size();
+  waiting_begin_.reset();
+  newest_ = trajectory_.empty() ? StampedPose{} : trajectory_.back();
   health_ = OdometryHealth::initialised;
 }
 
@@ -44,6 +46,8 @@ void LatestMap::correct(const MapCorrection& correction, std::shared_ptr<const M
   // Only the mapping thread adds poses: none came meanwhile.
   const std::scoped_lock lock(mutex_);
   trajectory_ = std::move(corrected);
+  if (const auto* const T_new_old = correction.at(newest_.stamp_ns))
+    newest_.T_map_lidar = *T_new_old * newest_.T_map_lidar;
   ++corrections_;
 }
 
@@ -60,16 +64,24 @@ void LatestMap::publish(std::shared_ptr<const MapSnapshot> view) {
 }
 
 void LatestMap::add_pose(const StampedPose& pose, OdometryHealth health,
-                         const std::string& label_source) {
+                         const std::string& label_source, MapEntry entry) {
   const std::scoped_lock lock(mutex_);
   ++poses_added_;
   health_ = health;
   label_source_ = label_source;
+  if (health != OdometryHealth::lost) newest_ = pose;
+  const bool is_denied = entry == MapEntry::stays_out_with_waiting;
+  if (is_denied || is_confirmed(entry)) {
+    const auto waiting = std::exchange(waiting_begin_, std::nullopt);
+    if (waiting && entry != MapEntry::enters_with_waiting) trajectory_.truncate(*waiting);
+  }
   // A pose that nothing confirmed is no part of the path, nor of its file.
-  if (health == OdometryHealth::lost) return;
+  if (health == OdometryHealth::lost || is_denied) return;
   std::size_t kept = trajectory_.size();
   while (kept > session_begin_ && trajectory_[kept - 1].stamp_ns >= pose.stamp_ns) --kept;
   trajectory_.truncate(kept);
+  if (waiting_begin_ && *waiting_begin_ > kept) waiting_begin_.reset();
+  if (entry == MapEntry::waits && !waiting_begin_) waiting_begin_ = kept;
   trajectory_.push_back(pose);
 }
 
@@ -104,7 +116,7 @@ std::optional<std::int64_t> LatestMap::seen_until_ns() const {
 
 StampedPose LatestMap::newest_pose() const {
   const std::scoped_lock lock(mutex_);
-  return trajectory_.empty() ? StampedPose{} : trajectory_.back();
+  return newest_;
 }
 
 Trajectory LatestMap::trajectory(std::size_t max_poses) const {

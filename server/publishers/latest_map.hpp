@@ -30,8 +30,10 @@ class LatestMap {
   void begin(std::shared_ptr<const MapSnapshot> view, SharedTrajectory trajectory);
   void publish(std::shared_ptr<const MapSnapshot> view);
   /// Removes poses of this session with the same or later stamps first: a clock that was set back
-  /// replaces what it said. A lost pose changes health and label source alone.
-  void add_pose(const StampedPose& pose, OdometryHealth health, const std::string& label_source);
+  /// replaces what it said. A lost pose changes health and label source alone. Poses that `entry`
+  /// shows to be wrong, and those that waited for it, are no part of the path.
+  void add_pose(const StampedPose& pose, OdometryHealth health, const std::string& label_source,
+                MapEntry entry = MapEntry::enters);
 
   /// The poses of this session were wrong by that; published with the view that it led to.
   void correct(const MapCorrection& correction, std::shared_ptr<const MapSnapshot> view);
@@ -56,7 +58,8 @@ class LatestMap {
   [[nodiscard]] Trajectory trajectory(std::size_t max_poses) const;
   /// `stillmap::server::seen_until_ns` of it.
   [[nodiscard]] std::optional<std::int64_t> seen_until_ns() const;
-  /// The newest pose that was not lost; the origin before the first.
+  /// The newest pose that was not lost, whether or not it is a part of the path; the origin before
+  /// the first.
   [[nodiscard]] StampedPose newest_pose() const;
   /// Expected pose of the first scan in a map that was loaded: the stored pose of its very stamp,
   /// when a recording is played again, else the last one, where the robot was switched off: a stamp
@@ -80,6 +83,9 @@ class LatestMap {
   SharedTrajectory trajectory_;
   /// Where the poses of this session begin in it.
   std::size_t session_begin_ = 0;
+  /// Where those begin in it that wait until a later one shows whether they are right.
+  std::optional<std::size_t> waiting_begin_;
+  StampedPose newest_;
   std::uint64_t poses_added_ = 0;
   std::uint64_t corrections_ = 0;
   OdometryHealth health_ = OdometryHealth::initialised;

@@ -34,14 +34,24 @@ TileRange window_round(const Eigen::Vector3d& robot_map, double tile_size_m) {
   return tile_range({robot_map - half, robot_map + half}, tile_size_m);
 }
 
-/// Memory of a cell for two robots with its columns and objects, about [B].
-constexpr std::size_t bytes_per_cell = 56;
+/// Memory of a cell with its columns and objects, and for each robot, about [B].
+constexpr std::size_t bytes_per_cell = 77;
+constexpr std::size_t bytes_per_robot = 8;
 
-std::size_t tiles_for(std::size_t bytes, const MapSnapshot& map) {
+std::size_t tiles_for(std::size_t bytes, std::size_t robots, const MapSnapshot& map) {
   if (!(map.voxel_size_m > 0.0)) return 0;
   const double cells = std::pow(map.tile_size_m / map.voxel_size_m, 2);
-  return static_cast<std::size_t>(static_cast<double>(bytes) / (cells * bytes_per_cell));
+  const auto bytes_per_tile =
+      cells * static_cast<double>(bytes_per_cell + robots * bytes_per_robot);
+  return static_cast<std::size_t>(static_cast<double>(bytes) / bytes_per_tile);
 }
+
+/// Tiles are read from disk so many at a time: what the robot sees meanwhile does not wait.
+constexpr std::size_t tiles_at_a_time = 16;
+/// A robot that drives on does not give up at once what it may come back to, of so many.
+constexpr double share_taken = 7.0 / 8.0;
+/// What cannot be read is tried again after so long.
+constexpr std::chrono::seconds retry_period{5};
 
 }  // namespace
 
@@ -70,8 +80,9 @@ TraversabilityThread::TraversabilityThread(std::vector<RobotProfile> robots,
 }
 
 void TraversabilityThread::follow_map(const std::stop_token& stop) {
-  const auto map_update = map_.latest.wait_for_update(known_, stop, idle_period);
-  if (!map_update) return follow_robot();
+  const auto map_update = map_.latest.wait_for_update(
+      known_, stop, has_more_on_disk_ ? std::chrono::milliseconds(0) : idle_period);
+  if (!map_update) return has_more_on_disk_ ? update_window() : follow_robot();
   clock_.sleep_until(next_update_, stop);
   if (stop.stop_requested()) return;
   next_update_ = clock_.now() + std::chrono::duration_cast<Clock::duration>(period_);
@@ -86,6 +97,7 @@ void TraversabilityThread::follow_map(const std::stop_token& stop) {
 
 void TraversabilityThread::follow_robot() {
   if (!known_) return;
+  if (retry_ && clock_.now() >= *retry_) return update_window();
   const Eigen::Vector3d robot_map = map_.latest.newest_pose().T_map_lidar.translation();
   if ((robot_map - robot_map_).norm() < noticed_motion_m) return;
   robot_map_ = robot_map;
@@ -95,32 +107,54 @@ void TraversabilityThread::follow_robot() {
   update_window();
 }
 
+std::vector<std::shared_ptr<const Tile>> TraversabilityThread::on_disk_nearest_first(
+    const MapSnapshot& map, std::vector<std::shared_ptr<const Tile>>& resident) const {
+  std::vector<std::pair<double, std::shared_ptr<const Tile>>> found;
+  for (auto& tile : tiles_in_range(map.tiles, window_)) {
+    if (!is_non_resident(*tile)) {
+      resident.push_back(std::move(tile));
+      continue;
+    }
+    const Eigen::Vector2d corner(tile->info.id.x, tile->info.id.y);
+    const Eigen::Vector2d centre_map = map.tile_size_m * (corner.array() + 0.5).matrix();
+    found.emplace_back((centre_map - robot_map_.head<2>()).norm(), std::move(tile));
+  }
+  std::ranges::stable_sort(found, {}, [](const auto& entry) { return entry.first; });
+  std::vector<std::shared_ptr<const Tile>> tiles;
+  tiles.reserve(found.size());
+  for (auto& entry : found) tiles.push_back(std::move(entry.second));
+  return tiles;
+}
+
 // Traversability takes memory as the map does: of what is on disk farther away, and beyond the
 // window, it is computed when queried.
 MapSnapshot TraversabilityThread::kept_part(const MapSnapshot& map) {
   MapSnapshot part = map;
-  std::vector<std::shared_ptr<const Tile>> tiles = tiles_in_range(map.tiles, window_);
-  const auto distance_m = [&](const Tile& tile) {
-    const Eigen::Vector2d corner(tile.info.id.x, tile.info.id.y);
-    return (map.tile_size_m * (corner.array() + 0.5).matrix() - robot_map_.head<2>()).norm();
-  };
-  std::vector<double> on_disk_m;
-  for (const auto& tile : tiles) {
-    if (is_non_resident(*tile)) on_disk_m.push_back(distance_m(*tile));
+  std::vector<std::shared_ptr<const Tile>> tiles;
+  const auto on_disk = on_disk_nearest_first(map, tiles);
+  const std::size_t room = tiles_for(map_.bytes_on_disk, traversability_.profiles().size(), map);
+  const auto taken = static_cast<std::size_t>(share_taken * static_cast<double>(room));
+  std::size_t added = 0;
+  has_more_on_disk_ = false;
+  for (std::size_t i = 0; i < std::min(room, on_disk.size()); ++i) {
+    const TileId id = on_disk[i]->info.id;
+    if (!kept_.contains(id)) {
+      if (i >= taken) continue;
+      if (added == tiles_at_a_time) {
+        has_more_on_disk_ = true;
+        continue;
+      }
+      ++added;
+    }
+    tiles.push_back(on_disk[i]);
   }
-  const std::size_t kept = tiles_for(map_.bytes_on_disk, map);
-  if (on_disk_m.size() > kept) {
-    std::ranges::nth_element(on_disk_m, on_disk_m.begin() + static_cast<std::ptrdiff_t>(kept));
-    const double reach_m = on_disk_m[kept];
-    std::erase_if(tiles, [&](const auto& tile) {
-      return is_non_resident(*tile) && distance_m(*tile) >= reach_m;
-    });
+  kept_.clear();
+  for (const auto& tile : tiles) kept_.insert(tile->info.id);
+  if (on_disk.size() > room) {
     throttled_log_.warn("traversability",
-                        "the grid lacks tiles that are on disk, " +
-                            std::to_string(std::lround(reach_m)) +
-                            " m and more from the robot: an eighth of map.memory_limit_mib has "
-                            "room for the traversability of " +
-                            std::to_string(kept) + " of " + std::to_string(on_disk_m.size()));
+                        "an eighth of map.memory_limit_mib has room for the traversability of " +
+                            std::to_string(room) + " of the " + std::to_string(on_disk.size()) +
+                            " tiles within 500 m that are on disk: the grid lacks the farthest");
   }
   part.tiles = TileTable(std::move(tiles));
   return part;
@@ -128,10 +162,18 @@ MapSnapshot TraversabilityThread::kept_part(const MapSnapshot& map) {
 
 void TraversabilityThread::update_window() {
   const MapSnapshot part = kept_part(*known_);
+  TraversabilityUpdate report;
   // On this thread only: the workers of TBB's other arenas run at full priority.
   tbb::task_arena this_thread(1);
-  this_thread.execute(
-      [&] { static_cast<void>(traversability_.update(part, throttle_, &map_.tiles)); });
+  this_thread.execute([&] { report = traversability_.update(part, throttle_, &map_.tiles); });
+  retry_.reset();
+  if (report.unread_tiles > 0) {
+    retry_ = clock_.now() + retry_period;
+    throttled_log_.warn("traversability_unread",
+                        std::to_string(report.unread_tiles) +
+                            " tiles that are on disk could not be read for the grid; they are "
+                            "tried again");
+  }
   publish();
   updated_();
 }

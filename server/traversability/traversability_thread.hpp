@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "core/map/query/tile_reader.hpp"
@@ -45,8 +46,11 @@ class TraversabilityThread {
   /// While the map does not change: scans that tell no place drive through it, too.
   void follow_robot();
   void update_window();
-  /// The tiles in the window whose traversability is kept.
+  /// The tiles in the window whose traversability is kept, and some more of those on disk.
   [[nodiscard]] MapSnapshot kept_part(const MapSnapshot& map);
+  /// Of the tiles in the window; the others are appended to `resident`.
+  [[nodiscard]] std::vector<std::shared_ptr<const Tile>> on_disk_nearest_first(
+      const MapSnapshot& map, std::vector<std::shared_ptr<const Tile>>& resident) const;
   void publish();
 
   std::chrono::duration<double> period_;
@@ -64,6 +68,11 @@ class TraversabilityThread {
   std::uint64_t corrections_ = 0;
   Eigen::Vector3d robot_map_ = Eigen::Vector3d::Zero();
   TileRange window_;
+  std::set<TileId> kept_;
+  /// Those that are to be kept are not all read yet.
+  bool has_more_on_disk_ = false;
+  /// When tiles that could not be read are tried again.
+  std::optional<MonotonicClock::TimePoint> retry_;
   MonotonicClock::TimePoint next_update_;
   // Last: stops before what it uses is gone.
   std::optional<PeriodicWorker> worker_;

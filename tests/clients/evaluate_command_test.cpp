@@ -164,7 +164,7 @@ TEST_F(EvaluateCommandTest, RefusesPredictionsThatDoNotFit) {
   write("predictions/000001.label", "1234");
   const ProcessResult too_short = run(command);
   EXPECT_EQ(too_short.exit_code, 2);
-  EXPECT_THAT(too_short.err, HasSubstr("000001.label"));
+  EXPECT_THAT(too_short.err, HasSubstr("predictions/000001.label: holds 1 labels"));
   std::filesystem::rename(folder_ / "predictions/000001.label", folder_ / "predictions/9.label");
   EXPECT_THAT(run(command).err, HasSubstr("9.label"));
 }

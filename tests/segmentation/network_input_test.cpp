@@ -119,6 +119,21 @@ TEST(NetworkInput, IntensityOfAnotherScaleIsBroughtToTheModels) {
   }
 }
 
+TEST(NetworkInput, RetroReflectorsOfAnotherScaleAreNoBrighterThanThoseOfTheUsualOne) {
+  Scan scan = random_scan(3000, 2);
+  for (float& intensity : scan.intensity) intensity *= 0.1F;
+  const RangeImage image = project(scan, model);
+  for (std::size_t i = 0; i < scan.size(); i += 50) scan.intensity[i] = 1.0F;
+  const std::vector<float> input = make_network_input(scan, image, model);
+  const float brightest = (1.0F - model.statistics.mean[4]) / model.statistics.deviation[4];
+  int bright = 0;
+  for (std::size_t i = 4 * pixels; i < 5 * pixels; ++i) {
+    EXPECT_LE(input[i], brightest * 1.0001F);
+    bright += input[i] > 0.999F * brightest ? 1 : 0;
+  }
+  EXPECT_GT(bright, 10);
+}
+
 TEST(NetworkInput, IntensityThatIsTheSameEverywhereIsNone) {
   Scan scan = random_scan(3000, 2);
   const RangeImage image = project(scan, model);

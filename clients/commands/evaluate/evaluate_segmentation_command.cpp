@@ -13,7 +13,6 @@
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/dataset/binary_file.hpp"
-#include "core/dataset/kitti_files.hpp"
 #include "core/dataset/scan_dataset.hpp"
 #include "core/evaluation/segmentation_score.hpp"
 #include "core/picture/segmentation_picture.hpp"
@@ -97,8 +96,13 @@ SequenceScore compare_files(const EvaluateSegmentationArguments& arguments) {
     if (!std::filesystem::exists(file)) {
       throw DatasetError(file, "is missing: there is a prediction for it");
     }
-    compared.score.add({}, reduced_classes(read_kitti_labels(file, classes.size())),
-                       reduced_classes(classes));
+    const auto true_classes = read_values<std::uint32_t>(file);
+    if (true_classes.size() != classes.size()) {
+      throw DatasetError(prediction, "holds " + std::to_string(classes.size()) + " labels, and " +
+                                         file.string() + " has " +
+                                         std::to_string(true_classes.size()));
+    }
+    compared.score.add({}, reduced_classes(true_classes), reduced_classes(classes));
     progress.update(++done);
   }
   return compared;

@@ -84,7 +84,9 @@ std::string class_table(const SegmentationScore& score) {
     const auto label = static_cast<SemanticClass>(k);
     table.add(std::string(name(label)), [&](const ConfusionMatrix& m) { return m.iou(label); });
   }
-  table.add("mean of 19", [](const ConfusionMatrix& m) { return std::optional(m.mean_iou()); });
+  table.add("mean of 19", [](const ConfusionMatrix& m) {
+    return m.total() > 0 ? std::optional(m.mean_iou()) : std::nullopt;
+  });
   table.add("mean of those seen", [](const ConfusionMatrix& m) { return m.mean_iou_of_present(); });
   table.add("accuracy", [](const ConfusionMatrix& m) { return m.accuracy(); });
   return table.text();

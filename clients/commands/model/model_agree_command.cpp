@@ -106,7 +106,9 @@ void add_model_agree_command(CommandHandle model, Action& action) {
   CommandHandle command = model.command("agree", "How far the engines agree on real scans");
   add_model_options(command, arguments->model);
   command.option("DATASET", arguments->dataset, "Data set whose scans are compared").required();
-  command.option("--scans", arguments->scans, "Scans to compare, evenly chosen").with_default();
+  command.option("--scans", arguments->scans, "Scans to compare, evenly chosen")
+      .above_zero()
+      .with_default();
   command.explain(
       "Example:\n"
       "  stillmap model agree my_model sequences/00 --scans 20\n"
