@@ -27,10 +27,12 @@ ReceivedFix from_nav_sat_fix(const sensor_msgs::msg::NavSatFix& message) {
               .latitude_deg = message.latitude(),
               .longitude_deg = message.longitude(),
               .altitude_m = message.altitude()};
-  if (message.position_covariance_type() == constants::COVARIANCE_TYPE_UNKNOWN)
-    fix.covariance_enu = unknown_sigma_enu_m.cwiseAbs2().asDiagonal();
-  else
-    fix.covariance_enu = Eigen::Map<const Covariance>(message.position_covariance().data());
+  const Eigen::Map<const Covariance> said(message.position_covariance().data());
+  // Drivers leave zeros where they know nothing, whatever the type says.
+  const bool is_known =
+      message.position_covariance_type() != constants::COVARIANCE_TYPE_UNKNOWN && !said.isZero(0.0);
+  fix.covariance_enu = unknown_sigma_enu_m.cwiseAbs2().asDiagonal();
+  if (is_known) fix.covariance_enu = said;
   if (std::string fault = fault_of(fix); !fault.empty()) return {std::nullopt, std::move(fault)};
   return {fix, ""};
 }

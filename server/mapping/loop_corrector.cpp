@@ -243,6 +243,10 @@ void LoopCorrector::hand_on_fixes(const Run& run) {
     const std::scoped_lock lock(mutex_);
     fixes.swap(fixes_);
   }
+  if (!closer_->end_reason().empty()) {
+    if (!fixes.empty()) statistics_.count("gnss_fixes_unused", fixes.size());
+    return;
+  }
   if (run.earlier_until_ns) {
     // Where an earlier map lies on the earth is known to who made it.
     if (fixes.empty()) return;

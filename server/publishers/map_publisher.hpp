@@ -1,5 +1,7 @@
 #pragma once
 
+#include <chrono>
+#include <optional>
 #include <string>
 
 #include "config/loaders/server_config.hpp"
@@ -7,6 +9,7 @@
 #include "idl/interface/topics.hpp"
 #include "nav_msgs.h"
 #include "sensor_msgs.h"
+#include "server/monitoring/log.hpp"
 #include "server/publishers/latest_map.hpp"
 #include "server/publishers/tile_publisher.hpp"
 #include "server/threads/periodic_worker.hpp"
@@ -46,6 +49,9 @@ class MapPublisher {
   float half_window_m_;
   PathState published_path_;
   PathState published_cloud_;
+  /// When tiles that could not be read are tried again.
+  std::optional<std::chrono::steady_clock::time_point> retry_cloud_;
+  ThrottledLog throttled_log_;
   TileReader& reader_;
   TilePublisher tiles_;
   dds::Writer<nav_msgs::msg::Path> path_;

@@ -51,6 +51,9 @@ TEST(GnssConversion, WhatCannotBeUsedIsSaid) {
   const ReceivedFix unknown = from_nav_sat_fix(message);
   ASSERT_TRUE(unknown.fix);
   EXPECT_EQ(unknown.fix->covariance_enu(0, 0), 9.0) << "of a receiver of single frequency";
+  message.position_covariance({});
+  message.position_covariance_type(2);
+  EXPECT_EQ(from_nav_sat_fix(message).fix->covariance_enu(0, 0), 9.0) << "zeros say nothing";
 }
 
 }  // namespace

@@ -295,7 +295,7 @@ class OdometryPriorFrames : public Frames {
   void drive_with_wheels(
       int scans, const std::string& child_frame,
       const Eigen::Isometry3d& T_wheels_after_reset = Eigen::Isometry3d::Identity(),
-      int poses = seen_scans + 2) {
+      int poses = seen_scans + 2, const std::string& odom_frame = "wheel_odom") {
     const auto topic = dds::odometry_prior_topic("odom_prior");
     dds::Writer<nav_msgs::msg::Odometry> wheels(*participant_, topic.dds_name, {.depth = 100});
     ASSERT_TRUE(wheels.readers().wait_for_any(patience));
@@ -305,7 +305,7 @@ class OdometryPriorFrames : public Frames {
       const Eigen::Isometry3d T =
           i < seen_scans / 2 ? T_wheels_base(i) : T_wheels_after_reset * T_wheels_base(i);
       ASSERT_TRUE(wheels.write(
-          wire::to_odometry({room_pose(i).stamp_ns, T}, none, "wheel_odom", child_frame)));
+          wire::to_odometry({room_pose(i).stamp_ns, T}, none, odom_frame, child_frame)));
     }
     for (int scan = 0; scan < scans; ++scan) {
       drive(scan, scan + 1, turned_mount());
@@ -454,8 +454,9 @@ TEST_F(OdometryPriorFrames, TheirOwnOdomStaysWhereItIsWhileTheNextPoseIsOnItsWay
         std::string(turned_mount_yaml));
   dds::Reader<tf2_msgs::msg::TFMessage> tf(*participant_, topics_.tf.dds_name, topics_.tf.reader);
   ASSERT_TRUE(tf.events().wait_for_writer(patience));
-  // The newest pose is of the last scan but one.
-  drive_with_wheels(seen_scans, "base_link", Eigen::Isometry3d::Identity(), seen_scans - 1);
+  // The newest pose is of the last scan but one; frames are named as drivers of old did.
+  drive_with_wheels(seen_scans, "/base_link", Eigen::Isometry3d::Identity(), seen_scans - 1,
+                    "/wheel_odom");
   std::vector<Eigen::Vector3d> origin_map;
   for (int i = 0; i < seen_scans; ++i) {
     tf2_msgs::msg::TFMessage message;

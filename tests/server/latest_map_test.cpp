@@ -94,6 +94,30 @@ TEST(LatestMap, KeepsLostPosesOutOfThePath) {
   EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{1, 2, 4}));
 }
 
+TEST(LatestMap, KeepsPosesThatAreDeniedLaterOutOfThePath) {
+  using enum MapEntry;
+  LatestMap latest_map;
+  latest_map.begin(std::make_shared<const MapSnapshot>(), {});
+  const auto add_as = [&](std::int64_t stamp_ns, MapEntry entry) {
+    latest_map.add_pose({.stamp_ns = stamp_ns}, OdometryHealth::degenerate, "none", entry);
+  };
+  add_as(1, enters);
+  add_as(2, waits);
+  add_as(3, stays_out);
+  add_as(4, waits);
+  add_as(5, enters_with_waiting);
+  EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{1, 2, 3, 4, 5})) << "they were right";
+  add_as(6, waits);
+  add_as(7, waits);
+  EXPECT_EQ(latest_map.newest_pose().stamp_ns, 7);
+  add_as(8, stays_out_with_waiting);
+  EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{1, 2, 3, 4, 5}));
+  EXPECT_EQ(latest_map.newest_pose().stamp_ns, 8) << "as far as anybody knows";
+  add_as(9, waits);
+  add_as(10, enters);
+  EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{1, 2, 3, 4, 5, 10}));
+}
+
 TEST(LatestMap, BeginsANewPathWithANewMap) {
   LatestMap latest_map;
   latest_map.begin(std::make_shared<const MapSnapshot>(MapSnapshot{.map_id = 1, .tiles = {}}), {});

@@ -124,6 +124,12 @@ TEST(PoseBuffer, StampsThatJitterAreNoSpeed) {
   }
 }
 
+TEST(PoseBuffer, AnOdometryThatSetItselfElsewhereIsNotCarriedOn) {
+  PoseBuffer poses;
+  for (int i = 0; i <= 50; ++i) poses.add({i * 20 * ms, at(0.2 * i + (i == 50 ? 5.0 : 0.0), 0.0)});
+  EXPECT_NEAR(poses.pose_at(1040 * ms)->translation().x(), 15.0, 1e-9);
+}
+
 TEST(PoseBuffer, TheNewestPoseStandsWhereItsMotionIsNotKnown) {
   PoseBuffer poses;
   poses.add({0, at(3.0, 0.0)});

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/dataset/dataset_error.hpp"
 #include "core/lendable_map.hpp"
 
 namespace stillmap::cli {
@@ -34,15 +35,22 @@ LoopCorrection::LoopCorrection(LoopOptions options, const SensorModel& sensor)
       antenna_lidar_(options.gnss.antenna_lidar),
       gnss_(options.gnss.config),
       sensor_(sensor),
+      scans_file_(options.scans_file),
       log_(options.scans_file, options.max_range_m),
       closer_(LoopClosingConfig{}) {
   std::ranges::stable_sort(fixes_, {}, &GnssFix::stamp_ns);
   for (const DeniedLoop& denied : options.denied) closer_.deny(denied);
 }
 
-void LoopCorrection::resume(std::size_t next_scan) {
+void LoopCorrection::resume(std::size_t next_scan, std::size_t poses) {
   const Timed timed(seconds_);
   log_.truncate_from(next_scan);
+  if (log_.size() < poses) {
+    throw DatasetError(scans_file_, "holds " + std::to_string(log_.size()) + " of the " +
+                                        std::to_string(poses) +
+                                        " scans that were mapped until the run was stopped (power "
+                                        "lost, or a damaged disk); begin anew with --force");
+  }
   log_.read([this](const LoggedScan& scan) {
     add(scan.index, scan.labelled, scan.T_odom_lidar, scan.entry);
   });

@@ -78,8 +78,9 @@ class LoopCorrection {
   /// Throws DatasetError.
   LoopCorrection(LoopOptions options, const SensorModel& sensor);
 
-  /// Goes on with the scans before this number, which are in the file. Throws DatasetError.
-  void resume(std::size_t next_scan);
+  /// Goes on with the scans before this number, which are in the file: those of `poses` poses at
+  /// least. Throws DatasetError.
+  void resume(std::size_t next_scan, std::size_t poses);
   /// The scan of this number in the data set. Throws DatasetError.
   void add(std::size_t index, const MappedScan& mapped);
   void flush() { log_.flush(); }
@@ -119,6 +120,7 @@ class LoopCorrection {
   Eigen::Vector3d antenna_lidar_;
   GnssTrack gnss_;
   SensorModel sensor_;
+  std::filesystem::path scans_file_;
   ScanLog log_;
   LoopCloser closer_;
   /// Of the scans added, in the data set.

@@ -53,14 +53,14 @@ class MappingRun {
   void resume(RunState earlier) {
     mapper_.resume(earlier.map.view, earlier.map.tile_evidence);
     earlier_ = earlier.map.trajectory.to_vector();
-    if (loops_) loops_->resume(earlier.next_scan);
+    if (loops_) loops_->resume(earlier.next_scan, earlier.scan_of_pose.size());
     result_.scan_of_pose = std::move(earlier.scan_of_pose);
     result_.resumed_at_scan = earlier.next_scan;
   }
 
   /// Begins with this scan: what an earlier run has kept is of no use.
   void begin(std::size_t first_scan) {
-    if (loops_) loops_->resume(first_scan);
+    if (loops_) loops_->resume(first_scan, 0);
   }
 
   /// Before the first scan: which ones map_scan() will get, in their order.

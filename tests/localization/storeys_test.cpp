@@ -1,0 +1,145 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "core/lidar/shared_trajectory.hpp"
+#include "core/localization/localizer.hpp"
+#include "core/map/query/tile_reader.hpp"
+#include "core/map/static_map.hpp"
+
+namespace stillmap::test {
+namespace {
+
+constexpr double length_m = 44.0;
+constexpr double width_m = 26.0;
+constexpr double storey_m = 3.0;
+constexpr double lidar_height_m = 1.0;
+
+struct Box {
+  Eigen::Vector3d low, high;
+};
+
+/// A car park of two decks: slabs, walls, pillars at the same places, and other things on each.
+class CarPark {
+ public:
+  CarPark() {
+    for (int storey = 0; storey <= 2; ++storey)
+      add({0, 0, storey * storey_m - 0.3}, {length_m, width_m, storey * storey_m});
+    add({-0.2, 0, 0}, {0, width_m, 2 * storey_m});
+    add({length_m, 0, 0}, {length_m + 0.2, width_m, 2 * storey_m});
+    add({0, -0.2, 0}, {length_m, 0, 2 * storey_m});
+    add({0, width_m, 0}, {length_m, width_m + 0.2, 2 * storey_m});
+    for (double x = 7.0; x < length_m; x += 10.0)
+      for (const double y : {8.0, 18.0}) add({x, y, 0}, {x + 0.4, y + 0.4, 2 * storey_m});
+    std::mt19937_64 random(7);
+    std::uniform_real_distribution<double> share(0.0, 1.0);
+    for (int storey = 0; storey < 2; ++storey) {
+      for (int k = 0; k < 18; ++k) {
+        const double x = 2.0 + share(random) * (length_m - 8.0);
+        const double y = k % 3 == 0   ? 0.3 + share(random)
+                         : k % 3 == 1 ? width_m - 2.5 + share(random)
+                                      : 11.0 + 2.0 * share(random);
+        add({x, y, storey * storey_m},
+            {x + 1.0 + 3.0 * share(random), y + 1.3, storey * storey_m + 1.3 + share(random)});
+      }
+    }
+  }
+
+  /// By 32 rings.
+  [[nodiscard]] Scan scan_at(const Eigen::Isometry3d& T_map_lidar, std::int64_t stamp_ns) const {
+    Scan scan;
+    scan.stamp_ns = stamp_ns;
+    for (int ring = 0; ring < 32; ++ring) {
+      const double elevation = (15.0 - ring * 40.0 / 31.0) * std::numbers::pi / 180.0;
+      for (int k = 0; k < 720; ++k) {
+        const double azimuth = k * std::numbers::pi / 360.0;
+        const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
+                                  std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+        const double range_m = range(T_map_lidar.translation(), T_map_lidar.linear() * ray);
+        if (range_m > 80.0) continue;
+        scan.points_lidar.push_back((range_m * ray).cast<float>());
+        scan.ring.push_back(static_cast<std::uint16_t>(ring));
+      }
+    }
+    return scan;
+  }
+
+ private:
+  void add(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+    boxes_.push_back({low, high});
+  }
+
+  [[nodiscard]] double range(const Eigen::Vector3d& from, const Eigen::Vector3d& ray) const {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const Box& box : boxes_) {
+      const Eigen::Array3d a = (box.low - from).array() / ray.array();
+      const Eigen::Array3d b = (box.high - from).array() / ray.array();
+      const double enter = a.min(b).maxCoeff();
+      const double leave = a.max(b).minCoeff();
+      if (enter > 0.0 && enter < leave) nearest = std::min(nearest, enter);
+    }
+    return nearest;
+  }
+
+  std::vector<Box> boxes_;
+};
+
+/// Round the deck; `share` of the way.
+Eigen::Isometry3d pose(int storey, double share, double aside_m = 0.0) {
+  const double angle = 2.0 * std::numbers::pi * share;
+  const Eigen::Vector3d position(
+      0.5 * length_m + (0.5 * length_m - 5.0 + aside_m) * std::cos(angle),
+      0.5 * width_m + (0.5 * width_m - 5.0 + aside_m) * std::sin(angle),
+      storey * storey_m + lidar_height_m);
+  // Off the axes, for rays that miss no plane.
+  return Eigen::Translation3d(position) * Eigen::AngleAxisd(angle + 1.5, Eigen::Vector3d::UnitZ());
+}
+
+std::shared_ptr<const PlaceIndex> index_of(const CarPark& park) {
+  StaticMap map{StaticMapConfig{}};
+  map.reset(1);
+  SharedTrajectory path;
+  for (int storey = 0; storey < 2; ++storey) {
+    for (int k = 0; k < 60; ++k) {
+      LabelledScan scan;
+      const Eigen::Isometry3d T_map_lidar = pose(storey, k / 60.0);
+      const std::int64_t stamp_ns = (60 * storey + k + 1) * 100'000'000LL;
+      scan.scan = park.scan_at(T_map_lidar, stamp_ns);
+      scan.motion.assign(scan.scan.size(), Motion::stationary);
+      map.insert(scan, T_map_lidar);
+      path.push_back({stamp_ns, T_map_lidar});
+    }
+  }
+  return std::make_shared<const PlaceIndex>(map.view(), path,
+                                            std::make_shared<TileReader>(nullptr));
+}
+
+// On the deck above, a scan fits the one below well enough: pillars and walls are the same.
+TEST(LocalizerOnStoreys, FindsTheDeckThatItIsOn) {
+  const CarPark park;
+  const Localizer localizer(index_of(park));
+  std::array<int, 2> found{};
+  for (int storey = 0; storey < 2; ++storey) {
+    for (int k = 0; k < 12; ++k) {
+      const Eigen::Isometry3d T_map_lidar = pose(storey, (k + 0.5) / 12.0, 0.7);
+      const LocalizationResult result =
+          localizer.localize(park.scan_at(T_map_lidar, 1), PointLabels{});
+      if (result.status != LocalizationStatus::found) continue;
+      const Eigen::Vector3d off =
+          result.places.front().T_map_lidar.translation() - T_map_lidar.translation();
+      EXPECT_LT(off.norm(), 0.3) << "deck " << storey << ", place " << k << ": " << off.transpose();
+      ++found[static_cast<std::size_t>(storey)];
+    }
+  }
+  EXPECT_GE(found[0], 6);
+  EXPECT_GE(found[1], 6);
+}
+
+}  // namespace
+}  // namespace stillmap::test
