@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include "core/odometry/se3.hpp"
@@ -118,7 +119,7 @@ std::size_t LoopCloser::positions_in_doubt() const {
 }
 
 void LoopCloser::use_positions() {
-  const std::vector<PositionMeasurement>& believed = positions_.believed();
+  const std::span<const PositionMeasurement> believed = positions_.believed();
   const auto is_node = [](const PositionMeasurement& a, const PositionMeasurement& b) {
     return a.node == b.node;
   };
@@ -141,7 +142,7 @@ void LoopCloser::use_positions() {
     if (was_bent) solve();
     return;
   }
-  graph_.positions = believed;
+  graph_.positions.assign(believed.begin(), believed.end());
   graph_.T_enu_map = *T_enu_map_;
   solve();
 }

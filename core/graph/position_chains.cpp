@@ -80,9 +80,8 @@ void PositionChains::clear() {
   dropped_ = used_ = 0;
 }
 
-const std::vector<PositionMeasurement>& PositionChains::believed() {
-  static const std::vector<PositionMeasurement> none;
-  if (chains_.empty()) return none;
+std::span<const PositionMeasurement> PositionChains::believed() {
+  if (chains_.empty()) return {};
   used_ = chains_.front().positions.size();
   return chains_.front().positions;
 }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "core/graph/pose_graph.hpp"
@@ -39,7 +40,7 @@ class PositionChains {
 
   /// Those of the largest chain. The newest one may still be replaced by a better one, until this
   /// is called.
-  [[nodiscard]] const std::vector<PositionMeasurement>& believed();
+  [[nodiscard]] std::span<const PositionMeasurement> believed();
   /// Positions of other chains.
   [[nodiscard]] std::size_t disbelieved() const;
 

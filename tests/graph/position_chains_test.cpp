@@ -64,7 +64,7 @@ TEST(PositionChains, OfTwoThatAreApartTheLongerOneIsBelieved) {
   for (const int until : {200, 400}) {
     PositionChains chains = chains_of(
         [&](int k, const Eigen::Vector3d& p) { return k < until ? p : (p + reflected).eval(); });
-    const auto& believed = chains.believed();
+    const auto believed = chains.believed();
     const bool is_first = believed.front().node == 0;
     EXPECT_EQ(is_first, until == 400) << until;
   }
