@@ -89,6 +89,13 @@ std::vector<std::string> command_names(const CLI::App& app) {
   return names;
 }
 
+/// Null where there is none of that name.
+const CLI::App* command_of(const CLI::App& app, const std::string& name) {
+  const auto found =
+      app.get_subcommands([&](const CLI::App* command) { return command->get_name() == name; });
+  return found.empty() ? nullptr : found.front();
+}
+
 std::vector<std::string> option_names(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::Option* option : app.get_options()) {
@@ -108,7 +115,7 @@ std::string meant(const CLI::App& program, std::span<const std::string> words) {
         const std::string option = nearest(name, option_names(*app));
         if (!option.empty()) return option;
       }
-    } else if (const CLI::App* const command = app->get_subcommand_no_throw(word)) {
+    } else if (const CLI::App* const command = command_of(*app, word)) {
       app = command;
     } else if (app->get_require_subcommand_min() > 0) {
       return nearest(word, command_names(*app));

@@ -17,8 +17,8 @@ constexpr std::int64_t max_ahead_ns = 100'000'000;
 // where its poses came no farther apart than this.
 constexpr std::int64_t max_gap_ns = 250'000'000;
 // No robot goes so far meanwhile.
-constexpr double max_way_m = 0.2;
-constexpr double max_speed_m_s = 40.0;
+constexpr double max_carried_m = 0.2;
+constexpr double max_carried_m_s = 40.0;
 // The next pose of an odometry comes sooner.
 constexpr std::int64_t max_step_ns = 5'000'000'000;
 // So many poses in a row, each after the other, are of the odometry's clock, whatever the poses
@@ -54,7 +54,7 @@ Eigen::Isometry3d carried_on(const std::deque<StampedPose>& poses, std::int64_t 
   const Eigen::Isometry3d T_earlier_newest = T_odom_earlier.inverse() * newest.T_map_lidar;
   // Where an odometry set itself elsewhere, that is no motion.
   const double way_m = T_earlier_newest.translation().norm();
-  if (way_m > max_way_m + 1e-9 * static_cast<double>(ahead_ns) * max_speed_m_s)
+  if (way_m > max_carried_m + 1e-9 * static_cast<double>(ahead_ns) * max_carried_m_s)
     return newest.T_map_lidar;
   const Eigen::Isometry3d carried = newest.T_map_lidar * T_earlier_newest;
   return carried.matrix().allFinite() ? carried : newest.T_map_lidar;
