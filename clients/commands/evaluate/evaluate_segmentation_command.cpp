@@ -195,7 +195,9 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
       "  stillmap evaluate segmentation --truth city --picture city.png\n"
       "  stillmap evaluate segmentation --model kitti --truth sequences/05 sequences/10\n"
       "Predictions pair with the truth by name, and every one needs its truth; scans without a\n"
-      "prediction do not count. A model runs as in the server, votes of the neighbours included.");
+      "prediction do not count. A model gets scans as they were recorded, points that a server "
+      "would\n"
+      "leave out (prepare) included; votes of the neighbours are, too.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
