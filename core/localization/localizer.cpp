@@ -53,8 +53,31 @@ LocalizationResult Localizer::localize(const LocalizationQuery& query,
         }))
       apart.push_back(place);
   }
+  drop_denied_storeys(query, apart);
   const LocalizationStatus status = judge_places(apart, config_);
   return {status, std::move(apart)};
+}
+
+void Localizer::drop_denied_storeys(const LocalizationQuery& query,
+                                    std::vector<PlaceHypothesis>& places) const {
+  for (std::size_t k = 1; k < places.size(); ++k) {
+    const Eigen::Isometry3d& T_best = places.front().T_map_lidar;
+    const Eigen::Isometry3d& T_other = places[k].T_map_lidar;
+    const Eigen::Isometry3d off = T_best.inverse() * T_other;
+    const bool is_above_or_below =
+        (T_other.translation() - T_best.translation()).head<2>().norm() < config_.min_other_m &&
+        Eigen::AngleAxisd(off.linear()).angle() < config_.min_other_rad;
+    if (!is_above_or_below) continue;
+    const auto points = index_->points_near(T_best.translation().head<2>(), surroundings_m);
+    const auto [only_best, only_other] = MapSurroundings(points).explained_by_one(
+        query, T_best * query.T_upright_lidar.inverse(), T_other * query.T_upright_lidar.inverse());
+    const auto tells = [&](int one, int other) {
+      return one >= config_.min_telling_points && one >= config_.min_telling_ratio * other;
+    };
+    if (tells(only_other, only_best)) std::swap(places.front(), places[k]);
+    if (tells(only_best, only_other) || tells(only_other, only_best))
+      places.erase(places.begin() + static_cast<std::ptrdiff_t>(k--));
+  }
 }
 
 PlaceHypothesis Localizer::align_at(const LocalizationQuery& query,

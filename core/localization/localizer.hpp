@@ -41,6 +41,11 @@ struct LocalizationConfig {
   /// Another place is at least so far away, or turned [m, rad].
   double min_other_m = 1.5;
   double min_other_rad = 0.26;
+  /// Of storeys one above another pillars and walls are the same: what only one pose explains of
+  /// the scan tells, so many points at least, and so many times as many as only the other one
+  /// explains.
+  int min_telling_points = 30;
+  int min_telling_ratio = 4;
   /// So much of the scan must stand up, and so much of the map must be in its sight.
   int min_points = 60;
   int min_map_points = 300;
@@ -93,6 +98,10 @@ class Localizer {
   [[nodiscard]] const LocalizationConfig& config() const { return config_; }
 
  private:
+  /// Of places one above another, those go that what differs between them denies. The best first.
+  void drop_denied_storeys(const LocalizationQuery& query,
+                           std::vector<PlaceHypothesis>& places) const;
+
   std::shared_ptr<const PlaceIndex> index_;
   LocalizationConfig config_;
 };

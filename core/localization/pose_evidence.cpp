@@ -90,6 +90,22 @@ void MapSurroundings::ask_map(const LocalizationQuery& query, const Eigen::Isome
     evidence.explained = std::max(evidence.explained, share(high_explained, high_points));
 }
 
+std::pair<int, int> MapSurroundings::explained_by_one(
+    const LocalizationQuery& query, const Eigen::Isometry3d& T_map_upright_a,
+    const Eigen::Isometry3d& T_map_upright_b) const {
+  const Eigen::Isometry3f T_a = T_map_upright_a.cast<float>();
+  const Eigen::Isometry3f T_b = T_map_upright_b.cast<float>();
+  std::pair<int, int> only(0, 0);
+  for (const FeaturePoint& point : query.features_upright.points) {
+    if (point.position_lidar.norm() > explained_range_m) continue;
+    const bool by_a = points_.nearest(T_a * point.position_lidar, 1, max_distance_m).count > 0;
+    const bool by_b = points_.nearest(T_b * point.position_lidar, 1, max_distance_m).count > 0;
+    only.first += by_a && !by_b ? 1 : 0;
+    only.second += by_b && !by_a ? 1 : 0;
+  }
+  return only;
+}
+
 void MapSurroundings::ask_ground(const LocalizationQuery& query, const Eigen::Isometry3f& T,
                                  PoseEvidence& evidence) const {
   int level = 0;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <span>
+#include <utility>
 
 #include "core/localization/localization_query.hpp"
 #include "core/odometry/feature_map.hpp"
@@ -37,6 +38,11 @@ class MapSurroundings {
                                         const Eigen::Isometry3d& T_map_upright) const;
   [[nodiscard]] PoseEvidence evidence(const LocalizationQuery& query,
                                       const Eigen::Isometry3d& T_map_upright) const;
+  /// Points of the scan that the map explains at the one pose and not at the other, and the other
+  /// way round.
+  [[nodiscard]] std::pair<int, int> explained_by_one(
+      const LocalizationQuery& query, const Eigen::Isometry3d& T_map_upright_a,
+      const Eigen::Isometry3d& T_map_upright_b) const;
 
  private:
   /// Each fills in its part; `T` is T_map_upright.

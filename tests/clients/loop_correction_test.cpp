@@ -1,9 +1,11 @@
 #include "clients/commands/mapping/loop_correction.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <set>
 
+#include "core/dataset/dataset_error.hpp"
 #include "tests/graph/street_world.hpp"
 #include "tests/scratch_folder.hpp"
 
@@ -72,9 +74,25 @@ TEST_F(StretchThatHasWaited, IsDecidedByScansAfterAnInterruption) {
     killed.flush();
   }
   LoopCorrection loops(options(), vlp_16());
-  loops.resume(begin + 10);
+  loops.resume(begin + 10, begin + 10);
   drive(loops, begin + 10, scans, MapEntry::enters_with_waiting);
   EXPECT_EQ(scans_in_map(loops), std::size_t{scans - 1});
+}
+
+// The power was lost before all scans were on disk: loops of the rest alone would be closed.
+TEST_F(StretchThatHasWaited, AnInterruptedRunWhoseScansAreGoneIsRefused) {
+  {
+    LoopCorrection killed(options(), vlp_16());
+    drive(killed, 0, begin, MapEntry::enters);
+    killed.flush();
+  }
+  LoopCorrection loops(options(), vlp_16());
+  try {
+    loops.resume(begin + 10, begin + 10);
+    FAIL() << "it has not all scans";
+  } catch (const DatasetError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("--force"));
+  }
 }
 
 TEST_F(StretchThatHasWaited, StaysOutAtTheEndOfTheDrive) {

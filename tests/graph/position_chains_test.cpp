@@ -59,15 +59,11 @@ TEST(PositionChains, WhatHoldsItsPositionFromTheBeginningOnMakesNoChain) {
   EXPECT_LE(chains.believed().size(), 3U);
 }
 
-TEST(PositionChains, OfTwoThatAreApartTheLongerOneIsBelieved) {
-  const Eigen::Vector3d reflected(20.0, 0.0, 0.0);
-  for (const int until : {200, 400}) {
-    PositionChains chains = chains_of(
-        [&](int k, const Eigen::Vector3d& p) { return k < until ? p : (p + reflected).eval(); });
-    const auto believed = chains.believed();
-    const bool is_first = believed.front().node == 0;
-    EXPECT_EQ(is_first, until == 400) << until;
-  }
+TEST(PositionChains, WhatIsSaidBeforeTheReceiverIsRightIsNotBelieved) {
+  PositionChains chains =
+      chains_of([](int k, const Eigen::Vector3d& p) { return k < 150 ? (0.2 * p).eval() : p; });
+  ASSERT_GE(chains.believed().size(), 35U);
+  EXPECT_GE(chains.believed()[2].node, 150U);
 }
 
 TEST(PositionChains, AReceiverGoesOnWhereOdometryWasLost) {
