@@ -31,10 +31,21 @@ class CarPark {
   CarPark() {
     for (int storey = 0; storey <= 2; ++storey)
       add({0, 0, storey * storey_m - 0.3}, {length_m, width_m, storey * storey_m});
-    add({-0.2, 0, 0}, {0, width_m, 2 * storey_m});
-    add({length_m, 0, 0}, {length_m + 0.2, width_m, 2 * storey_m});
-    add({0, -0.2, 0}, {length_m, 0, 2 * storey_m});
-    add({0, width_m, 0}, {length_m, width_m + 0.2, 2 * storey_m});
+    for (int storey = 0; storey < 2; ++storey) {
+      const double floor = storey * storey_m;
+      add({-0.2, 0, floor}, {0, width_m, floor + 1.1});
+      add({length_m, 0, floor}, {length_m + 0.2, width_m, floor + 1.1});
+      add({0, -0.2, floor}, {length_m, 0, floor + 1.1});
+      add({0, width_m, floor}, {length_m, width_m + 0.2, floor + 1.1});
+    }
+    // Stairs, and the houses that are seen from both.
+    add({28, 9, 0}, {34, 13, 2 * storey_m});
+    add({-14, -12, 0}, {-8, 9, 9});
+    add({8, -19, 0}, {20, -11, 7});
+    add({29, -16, 0}, {40, -8, 8});
+    add({54, 2, 0}, {60, 21, 9});
+    add({3, 37, 0}, {16, 45, 6.5});
+    add({26, 33, 0}, {31, 40, 8});
     for (double x = 7.0; x < length_m; x += 10.0)
       for (const double y : {8.0, 18.0}) add({x, y, 0}, {x + 0.4, y + 0.4, 2 * storey_m});
     std::mt19937_64 random(7);

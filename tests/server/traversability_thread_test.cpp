@@ -367,6 +367,7 @@ TEST_F(TraversabilityThreadTest, TilesThatCannotBeReadAreTriedAgain) {
   ASSERT_TRUE(wait_for_version(whole.version));
   EXPECT_TRUE(snapshot_.view("small")->tiles.empty());
   tiles_.use_tile_store(std::make_shared<StoredTiles>(whole));
+  clock_.advance(10s);
   EXPECT_TRUE(wait_for(
       [&](const TraversabilityView& view) { return view.tiles.size() == whole.tiles.size(); }));
 }
