@@ -256,7 +256,8 @@ TEST(ServerConfig, RefusesValuesOfTheWrongKind) {
 
 TEST(ServerConfig, RefusesValuesThatDoNotFitTogether) {
   EXPECT_THAT(refusal_of("labels: {model: \"\"}"), HasSubstr("give a model's name"));
-  EXPECT_THAT(refusal_of("prepare: {min_range_m: 200}"), HasSubstr("above min_range_m"));
+  EXPECT_THAT(refusal_of("prepare: {min_range_m: 200, max_range_m: 100}"),
+              HasSubstr("above min_range_m"));
   EXPECT_THAT(refusal_of("prepare: {ego_hull_lidar_m: [1, 2]}"), HasSubstr("has 2 numbers"));
   EXPECT_THAT(refusal_of("prepare: {ego_hull_lidar_m: [1, 1, 1, 0, 0, 0]}"),
               HasSubstr("minimum above"));
@@ -333,11 +334,11 @@ TEST(ServerConfig, RefusesARangeThatLeavesNoPointOfTheSensor) {
 }
 
 TEST(ServerConfig, TakesTheSensorsRangesByTheirWord) {
-  const ServerConfig avia =
-      load("sensor: livox_avia\nprepare: {min_range_m: sensor, max_range_m: sensor}");
+  const std::string livox = "sensor: " + shipped("sensors/livox_avia.yaml").string() + "\n";
+  const ServerConfig avia = load(livox + "prepare: {min_range_m: sensor, max_range_m: sensor}");
   EXPECT_EQ(avia.mapper.prepare.min_range_m, 1.0);
   EXPECT_EQ(avia.mapper.prepare.max_range_m, 200.0);
-  const ServerConfig far = load("sensor: livox_avia\nprepare: {min_range_m: 150}");
+  const ServerConfig far = load(livox + "prepare: {min_range_m: 150}");
   EXPECT_EQ(far.mapper.prepare.min_range_m, 150.0);
   EXPECT_EQ(far.mapper.prepare.max_range_m, 200.0);
   EXPECT_EQ(load("prepare: {min_range_m: 150}").mapper.prepare.min_range_m, 150.0);
