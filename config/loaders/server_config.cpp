@@ -466,7 +466,8 @@ ServerConfig load_server_config(const fs::path& file, ConfigReport& report) {
     yaml.require_no_faults();
   }
   report = std::move(yaml.report);
-  use_sensor(sensor, automatic, config.mapper);
+  // The range that the file says is kept for the lidar that will be told.
+  if (!fault) use_sensor(sensor, automatic, config.mapper);
   return config;
 }
 
