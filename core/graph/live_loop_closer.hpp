@@ -56,6 +56,11 @@ class LiveLoopCloser {
   /// A fix, before or after the scans around it. Returns why it is not used; empty where it is.
   [[nodiscard]] std::string add(const GnssFix& fix);
 
+  /// As LoopCloser.
+  [[nodiscard]] LoopCloser::PositionCounts position_counts() const {
+    return closer_.position_counts();
+  }
+
   /// The next scan of the map, by a pose that no correction moved, with the place of the receiver's
   /// antenna on its lidar. A correction is of the map as
   /// the corrections before have left it, and is taken to be carried out.

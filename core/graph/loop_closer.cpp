@@ -105,8 +105,8 @@ void LoopCloser::drop_positions() {
 }
 
 LoopCloser::PositionCounts LoopCloser::position_counts() const {
-  if (!T_enu_map_) return {};
   const std::size_t others = positions_.disbelieved();
+  if (!T_enu_map_) return {.used = others, .in_doubt = others};
   return {.used = graph_.positions.size() + others, .in_doubt = positions_in_doubt() + others};
 }
 

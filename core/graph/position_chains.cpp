@@ -7,7 +7,7 @@ namespace stillmap {
 namespace {
 
 /// Odometry errs by less, as a share of the way, and where it could not confirm scans on it.
-constexpr double odometry_share_of_way = 0.05;
+constexpr double odometry_share_of_way = 0.15;
 constexpr double unconfirmed_share_of_way = 0.5;
 constexpr double unconfirmed_m = 2.0;
 /// Standard deviations that a distance may be off.
@@ -19,17 +19,19 @@ double sigma_m(const PositionMeasurement& measured) {
   return horizontal_sigma_m(measured.information.inverse());
 }
 
-/// Heights say less, and odometry's z may not be up.
+/// In plan, since heights say less. Odometry's z may not be up: then its plan is shorter, and its
+/// whole length is no less.
 bool goes_on(const PositionOnWay& last, const PositionOnWay& next) {
   const double measured_m =
       (next.measured.position_enu - last.measured.position_enu).head<2>().norm();
-  const double driven_m = (next.point_odom - last.point_odom).head<2>().norm();
+  const Eigen::Vector3d driven = next.point_odom - last.point_odom;
   const double way_m = next.way_m - last.way_m;
   double allowed_m = max_sigmas * std::hypot(sigma_m(last.measured), sigma_m(next.measured)) +
                      odometry_share_of_way * way_m;
   if (next.unconfirmed_scans > last.unconfirmed_scans)
     allowed_m += unconfirmed_m + unconfirmed_share_of_way * way_m;
-  return std::abs(measured_m - driven_m) <= allowed_m;
+  return measured_m >= driven.head<2>().norm() - allowed_m &&
+         measured_m <= driven.norm() + allowed_m;
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace stillmap {
@@ -53,9 +54,34 @@ LocalizationResult Localizer::localize(const LocalizationQuery& query,
         }))
       apart.push_back(place);
   }
+  add_other_storeys(query, apart);
   drop_denied_storeys(query, apart);
   const LocalizationStatus status = judge_places(apart, config_);
   return {status, std::move(apart)};
+}
+
+void Localizer::add_other_storeys(const LocalizationQuery& query,
+                                  std::vector<PlaceHypothesis>& places) const {
+  if (!index_->has_storeys() || places.empty() || !is_believed(places.front().evidence, config_))
+    return;
+  const Eigen::Isometry3d T_best = places.front().T_map_lidar;
+  const Eigen::Isometry3d T_map_foot =
+      T_best * query.T_upright_lidar.inverse() * query.T_foot_upright.inverse();
+  const Eigen::Vector2d place_map = T_best.translation().head<2>();
+  double ground_m = T_map_foot.translation().z();
+  if (!query.has_ground) ground_m -= index_->body_height_m(place_map);
+  for (const double floor_m : index_->floors_near(place_map, index_->config().corridor_m)) {
+    if (std::abs(floor_m - ground_m) < config_.min_other_m) continue;
+    const Eigen::Isometry3d T_there = Eigen::Translation3d(0.0, 0.0, floor_m - ground_m) * T_best;
+    const PlaceHypothesis there = align_at(query, T_there);
+    const bool is_new = std::ranges::all_of(places, [&](const PlaceHypothesis& known) {
+      return is_other_place(known.T_map_lidar, there.T_map_lidar, config_);
+    });
+    if (is_new) places.push_back(there);
+  }
+  std::ranges::stable_sort(places, [](const PlaceHypothesis& a, const PlaceHypothesis& b) {
+    return a.evidence.score() > b.evidence.score();
+  });
 }
 
 void Localizer::drop_denied_storeys(const LocalizationQuery& query,

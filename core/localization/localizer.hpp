@@ -98,6 +98,10 @@ class Localizer {
   [[nodiscard]] const LocalizationConfig& config() const { return config_; }
 
  private:
+  /// Where there are storeys: the same place on the others, too, whether or not the search found it
+  /// there.
+  void add_other_storeys(const LocalizationQuery& query,
+                         std::vector<PlaceHypothesis>& places) const;
   /// Of places one above another, those go that what differs between them denies. The best first.
   void drop_denied_storeys(const LocalizationQuery& query,
                            std::vector<PlaceHypothesis>& places) const;

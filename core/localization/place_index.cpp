@@ -36,8 +36,10 @@ constexpr float min_storey_gap_m = 1.8F;
 /// [m].
 constexpr float min_storey_height_m = 2.4F;
 constexpr double storey_cell_m = 6.0;
-/// Ground of nodes that goes on in one another is of one storey [m].
-constexpr double min_storey_step_m = 1.5;
+/// Ground of the nodes of one block differs by no more, or a ramp would join two storeys [m].
+constexpr double max_block_step_m = 0.8;
+/// Floors of a place that are so far apart are two [m].
+constexpr double min_floor_step_m = 1.2;
 
 /// What of one tile enters the index.
 struct TileContent {
@@ -310,7 +312,7 @@ std::vector<std::vector<std::uint32_t>> PlaceIndex::storeys_of(
   std::vector<std::vector<std::uint32_t>> storeys;
   for (const std::uint32_t k : nodes) {
     const bool is_above =
-        storeys.empty() || ground_m(k) - ground_m(storeys.back().back()) > min_storey_step_m;
+        storeys.empty() || ground_m(k) - ground_m(storeys.back().front()) > max_block_step_m;
     if (is_above) storeys.emplace_back();
     storeys.back().push_back(k);
   }
@@ -368,6 +370,27 @@ std::vector<LabelledPoint> PlaceIndex::points_near(const Eigen::Vector2d& positi
   std::vector<LabelledPoint> points;
   for (const auto& found : of_tile) points.insert(points.end(), found.begin(), found.end());
   return points;
+}
+
+double PlaceIndex::body_height_m(const Eigen::Vector2d& position_map) const {
+  const auto nearest = std::ranges::min_element(nodes_, {}, [&](const PathNode& node) {
+    return (node.position_map - position_map).squaredNorm();
+  });
+  return nearest == nodes_.end() ? usual_body_height_m : nearest->body_height_m;
+}
+
+std::vector<double> PlaceIndex::floors_near(const Eigen::Vector2d& position_map,
+                                            double radius_m) const {
+  std::vector<double> heights_m;
+  for (const PathNode& node : nodes_)
+    if ((node.position_map - position_map).norm() < radius_m)
+      heights_m.push_back(node.ground.at(position_map - node.position_map));
+  std::ranges::sort(heights_m);
+  std::vector<double> floors_m;
+  for (const double height_m : heights_m)
+    if (floors_m.empty() || height_m - floors_m.back() > min_floor_step_m)
+      floors_m.push_back(height_m);
+  return floors_m;
 }
 
 std::size_t PlaceIndex::memory_bytes() const {

@@ -68,6 +68,14 @@ class PlaceIndex {
   /// tiles' store throws.
   [[nodiscard]] std::vector<LabelledPoint> points_near(const Eigen::Vector2d& position_map,
                                                        double radius_m) const;
+  /// Whether the path leads over itself.
+  [[nodiscard]] bool has_storeys() const { return has_storeys_; }
+  /// Heights of the ground at a place by the nodes within this distance, the lowest first, each
+  /// storey once. Where there are storeys.
+  [[nodiscard]] std::vector<double> floors_near(const Eigen::Vector2d& position_map,
+                                                double radius_m) const;
+  /// Of the path above the ground, at the nearest node [m].
+  [[nodiscard]] double body_height_m(const Eigen::Vector2d& position_map) const;
   /// Tiles that could not be read: nothing is looked for there.
   [[nodiscard]] std::size_t unread_tiles() const { return unread_tiles_; }
   /// Of the index itself.

@@ -122,6 +122,8 @@ struct StaticMap::State {
   [[nodiscard]] double reach_m() const { return config.max_range_m + 2.0 * config.tile_size_m; }
 
   StaticMapConfig config;
+  /// Of the poses that it was made by.
+  std::uint64_t corrections = 0;
   MapTiles tiles;
   ScanSorter sorter;
   bool is_frozen = false;
@@ -266,8 +268,9 @@ std::optional<CorrectedMap> StaticMap::correct(const MapCorrection& correction,
   if (bytes > limit_bytes) return std::nullopt;
   for (const TileId id : stored) static_cast<void>(tiles.reload(id));
 
-  const TileCorrection mover(correction, tiles.grid(), tiles.stamps(),
-                             [&tiles](TileId id) { return !tiles.is_known_non_resident(id); });
+  const TileCorrection mover(
+      correction, tiles.grid(), tiles.stamps(),
+      [&tiles](TileId id) { return !tiles.is_known_non_resident(id); }, ++state_->corrections);
   const std::vector<LiveTile*> sources = tiles.residents();
   std::vector<TileCorrection::Moved> taken(sources.size());
   tbb::parallel_for(std::size_t{0}, sources.size(),

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "core/map/packed_voxels.hpp"
@@ -43,6 +44,16 @@ ClassEvidence sum_of(const ClassEvidence& a, const ClassEvidence& b) {
 }
 
 }  // namespace
+
+TileCorrection::TileCorrection(const MapCorrection& correction, const VoxelGrid& grid,
+                               const ScanStamps& stamps, std::function<bool(TileId)> is_open,
+                               std::uint64_t number)
+    : correction_(correction), grid_(grid), stamps_(stamps), is_open_(std::move(is_open)) {
+  // Evenly spread over numbers that follow each other, of each axis: multiples of the golden ratio.
+  const Eigen::Array3d places = Eigen::Array3d(0.0, 1.0 / 3.0, 2.0 / 3.0) +
+                                std::numbers::phi * static_cast<double>(number % 1'000'000);
+  rounding_m_ = grid_.voxel_size_m() * (places - places.floor() - 0.5).matrix();
+}
 
 std::optional<Eigen::Vector3d> TileCorrection::new_position(const Eigen::Vector3d& position_map,
                                                             std::uint32_t scan) const {
@@ -88,7 +99,9 @@ std::optional<TileCorrection::Place> TileCorrection::moved(
     const LiveTile& tile, std::uint32_t key, const LiveTile::Excluded& excluded) const {
   const auto position = new_position(tile.centre_map(key).cast<double>(), excluded.last_scan);
   if (!position) return std::nullopt;
-  const VoxelGrid::Index index = grid_.index(*position);
+  const Eigen::Vector3d rounded = *position + rounding_m_;
+  const VoxelGrid::Index index = grid_.index(grid_.holds(rounded) ? rounded : *position);
+  if (!is_open_(index.tile)) return std::nullopt;
   return Place{index.tile, voxel_key(index.voxel), excluded};
 }
 

@@ -16,14 +16,13 @@
 namespace stillmap {
 
 /// Moves voxels to where a correction of the map takes them: as poses of the time at which each was
-/// first seen, and places of objects as those at which they were last seen. What a correction moves
-/// by less than half a voxel stays. The same tiles give the same result.
+/// first seen, and places of objects as those at which they were last seen: these by whole voxels,
+/// rounded another way by each correction, so that many small ones add up.
 class TileCorrection {
  public:
-  /// All must outlive it. Nothing moves into tiles that are not open.
+  /// All must outlive it. Nothing moves into tiles that are not open. `number`: of the correction.
   TileCorrection(const MapCorrection& correction, const VoxelGrid& grid, const ScanStamps& stamps,
-                 std::function<bool(TileId)> is_open)
-      : correction_(correction), grid_(grid), stamps_(stamps), is_open_(std::move(is_open)) {}
+                 std::function<bool(TileId)> is_open, std::uint64_t number);
 
   /// A voxel of the corrected map.
   struct Voxel {
@@ -69,6 +68,8 @@ class TileCorrection {
   const VoxelGrid& grid_;
   const ScanStamps& stamps_;
   std::function<bool(TileId)> is_open_;
+  /// Added to places before they are rounded [m]: below half a voxel.
+  Eigen::Vector3d rounding_m_;
 };
 
 }  // namespace stillmap

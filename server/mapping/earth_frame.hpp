@@ -22,7 +22,15 @@ class EarthFrame {
   void forget() {
     place_.reset();
     tf_static_.reset();
+    is_withdrawn_ = false;
   }
+  /// The place of this map was found wrong.
+  void withdraw() {
+    forget();
+    is_withdrawn_ = true;
+  }
+  /// Whether what was told of this map before is none any more, and nothing else is known.
+  [[nodiscard]] bool is_withdrawn() const { return is_withdrawn_ && !place_; }
   /// A better place of the map; one that hardly differs from the last is not told.
   void publish(std::int64_t stamp_ns, const MapOnEarth& place);
   /// As datum_from_text() reads it; empty where it is not known.
@@ -35,6 +43,7 @@ class EarthFrame {
   /// While the place is known.
   std::optional<dds::Writer<tf2_msgs::msg::TFMessage>> tf_static_;
   std::optional<MapOnEarth> place_;
+  bool is_withdrawn_ = false;
 };
 
 }  // namespace stillmap::server

@@ -198,6 +198,7 @@ void LoopCorrector::close(const ScanOfMap& scan, bool enters) {
   if (std::exchange(closed_map_, map) != map) {
     closer_.emplace(closer_for(scan.run));
     reported_ = reported_anchors_ = reported_placed_ = reported_misplaced_ = handed_on_submaps_ = 0;
+    reported_doubted_ = 0;
     had_place_ = false;
   }
   const auto began = std::chrono::steady_clock::now();
@@ -274,6 +275,8 @@ void LoopCorrector::hand_on_fixes(const Run& run) {
 }
 
 void LoopCorrector::hand_on_place(std::uint64_t map) {
+  // What was found until then stays.
+  if (!closer_->end_reason().empty()) return;
   const auto place = closer_->on_earth();
   const bool had_place = std::exchange(had_place_, place.has_value());
   const std::scoped_lock lock(mutex_);
@@ -290,6 +293,7 @@ void LoopCorrector::report_fixes() {
   const GnssTrack& gnss = closer_->gnss();
   count_new("gnss_fixes", gnss.placed(), reported_placed_);
   count_new("gnss_fixes_between_no_scans", gnss.misplaced(), reported_misplaced_);
+  count_new("gnss_positions_doubted", closer_->position_counts().in_doubt, reported_doubted_);
 }
 
 void LoopCorrector::count_new(const char* counter, std::size_t now, std::size_t& reported) {

@@ -189,6 +189,7 @@ class LoopCorrector {
   std::size_t reported_anchors_ = 0;
   std::size_t reported_placed_ = 0;
   std::size_t reported_misplaced_ = 0;
+  std::size_t reported_doubted_ = 0;
   std::size_t handed_on_submaps_ = 0;
   ThrottledLog throttled_log_;
 

@@ -406,6 +406,7 @@ RunCheckpoint MapSaver::take(CheckpointScope scope) const {
   metadata.merge(checkpoint.map.metadata);
   checkpoint.map.metadata = std::move(metadata);
   checkpoint.map.metadata.insert(stored_metadata_.begin(), stored_metadata_.end());
+  std::erase_if(checkpoint.map.metadata, [](const auto& entry) { return entry.second.empty(); });
   return checkpoint;
 }
 

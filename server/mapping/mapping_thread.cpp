@@ -183,7 +183,7 @@ void MappingThread::set_elsewhere() {
 
 void MappingThread::close_loops() {
   if (outputs_.loops == nullptr || is_map_frozen_) return;
-  if (outputs_.loops->take_withdrawal() && outputs_.earth != nullptr) outputs_.earth->forget();
+  if (outputs_.loops->take_withdrawal() && outputs_.earth != nullptr) outputs_.earth->withdraw();
   if (const auto place = outputs_.loops->take_place(); place && outputs_.earth != nullptr)
     outputs_.earth->publish(latest_map_.newest_pose().stamp_ns, *place);
   if (const auto submaps = outputs_.loops->take_submaps()) publish_submaps(*submaps);
@@ -243,8 +243,12 @@ RunCheckpoint MappingThread::checkpoint(CheckpointScope scope) {
   MapCheckpoint map;
   SharedTrajectory path;
   std::string datum;
+  bool is_withdrawn = false;
   requests_.run([&] {
-    if (outputs_.earth != nullptr) datum = outputs_.earth->datum();
+    if (outputs_.earth != nullptr) {
+      datum = outputs_.earth->datum();
+      is_withdrawn = outputs_.earth->is_withdrawn();
+    }
     const auto began = Clock::now();
     map = mapper_.static_map().checkpoint(scope);
     latest_map_.publish(map.view);
@@ -253,7 +257,8 @@ RunCheckpoint MappingThread::checkpoint(CheckpointScope scope) {
   });
   RunCheckpoint checkpoint{to_saved_map(map), map.step};
   checkpoint.map.trajectory = std::move(path);
-  if (!datum.empty()) checkpoint.map.metadata["datum"] = datum;
+  // Empty: not that of the last save either.
+  if (!datum.empty() || is_withdrawn) checkpoint.map.metadata["datum"] = datum;
   if (const std::string sensor = statistics_.sensor(); !sensor.empty())
     checkpoint.map.metadata["sensor"] = sensor;
   return checkpoint;

@@ -87,7 +87,9 @@ void TraversabilityThread::follow_map(const std::stop_token& stop) {
   if (stop.stop_requested()) return;
   next_update_ = clock_.now() + std::chrono::duration_cast<Clock::duration>(period_);
   corrections_ = map_.latest.corrections();
-  known_ = map_.latest.view();
+  const auto view = map_.latest.view();
+  if (!known_ || known_->map_id != view->map_id) kept_.clear();
+  known_ = view;
   robot_map_ = map_.latest.newest_pose().T_map_lidar.translation();
   window_ = window_round(robot_map_, known_->tile_size_m);
   update_window();

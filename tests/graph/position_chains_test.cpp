@@ -66,6 +66,22 @@ TEST(PositionChains, WhatIsSaidBeforeTheReceiverIsRightIsNotBelieved) {
   EXPECT_GE(chains.believed()[2].node, 150U);
 }
 
+// Without an IMU a map is as level as its first scan's lidar was.
+TEST(PositionChains, OdometryMayBeTiltedAndATenthTooLong) {
+  for (const double tilt_rad : {0.0, 0.5, 1.5}) {
+    for (const double scale : {0.9, 1.0, 1.1}) {
+      PositionChains chains(5.0, 10.0);
+      const Eigen::AngleAxisd tilt(tilt_rad, Eigen::Vector3d(0.6, 0.8, 0.0));
+      for (int k = 0; k < 600; ++k) {
+        PositionOnWay position = measured(k, place(k), 0.02);
+        position.point_odom = scale * (tilt * place(k));
+        chains.add(position);
+      }
+      EXPECT_EQ(chains.disbelieved(), 0U) << tilt_rad << " rad, " << scale;
+    }
+  }
+}
+
 TEST(PositionChains, AReceiverGoesOnWhereOdometryWasLost) {
   PositionChains chains(5.0, 10.0);
   for (int k = 0; k < 600; ++k) {

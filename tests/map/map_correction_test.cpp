@@ -182,6 +182,12 @@ TEST(CorrectedStaticMap, PlacesOfObjectsMoveAlong) {
   ASSERT_EQ(moved.size(), 1U);
   EXPECT_NEAR(moved[0].position_map.x(), 25.1F, 1e-3F);
   EXPECT_EQ(moved[0].reason, RemovalReason::moving);
+  // Places are voxels, and have no rest of a move: many small ones add up all the same.
+  for (int k = 0; k < 20; ++k)
+    ASSERT_TRUE(map.correct(correction(1, Isometry3d(Translation3d(0.0, 0.08, -0.03)))));
+  ASSERT_EQ(places().size(), 1U);
+  EXPECT_NEAR(places()[0].position_map.y(), 6.7F, 0.31F);
+  EXPECT_NEAR(places()[0].position_map.z(), 0.5F, 0.31F);
 }
 
 /// Keeps what checkpoints hold.

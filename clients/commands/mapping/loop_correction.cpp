@@ -46,10 +46,11 @@ void LoopCorrection::resume(std::size_t next_scan, std::size_t poses) {
   const Timed timed(seconds_);
   log_.truncate_from(next_scan);
   if (log_.size() < poses) {
-    throw DatasetError(scans_file_, "holds " + std::to_string(log_.size()) + " of the " +
-                                        std::to_string(poses) +
-                                        " scans that were mapped until the run was stopped (power "
-                                        "lost, or a damaged disk); begin anew with --force");
+    throw DatasetError(
+        scans_file_,
+        "holds " + std::to_string(log_.size()) + " of the " + std::to_string(poses) +
+            " scans that were mapped until the run was stopped (power lost, a damaged disk, or "
+            "another version of Stillmap); begin anew with --force");
   }
   log_.read([this](const LoggedScan& scan) {
     add(scan.index, scan.labelled, scan.T_odom_lidar, scan.entry);
