@@ -67,8 +67,8 @@ class SqliteTileStore : public TileStore {
   }
 
  private:
-  /// The mapper, the search for loops, the publishers of tiles and of the cloud, traversability, and
-  /// the six services that read tiles: none waits.
+  /// The mapper, the search for loops, the publishers of tiles and of the cloud, traversability,
+  /// and the six services that read tiles: none waits.
   static constexpr std::size_t max_readers = 11;
 
   /// A connection that no other reader has.
