@@ -100,9 +100,12 @@ void Localizer::drop_denied_storeys(const LocalizationQuery& query,
     const auto tells = [&](int one, int other) {
       return one >= config_.min_telling_points && one >= config_.min_telling_ratio * other;
     };
-    if (tells(only_other, only_best)) std::swap(places.front(), places[k]);
-    if (tells(only_best, only_other) || tells(only_other, only_best))
-      places.erase(places.begin() + static_cast<std::ptrdiff_t>(k--));
+    const bool is_other_right = tells(only_other, only_best);
+    if (!is_other_right && !tells(only_best, only_other)) continue;
+    if (is_other_right) std::swap(places.front(), places[k]);
+    places.erase(places.begin() + static_cast<std::ptrdiff_t>(k));
+    // A new best one is compared with all.
+    k = is_other_right ? 0 : k - 1;
   }
 }
 
