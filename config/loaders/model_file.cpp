@@ -89,6 +89,17 @@ void read_knn(YamlSection section, std::optional<KnnConfig>& knn) {
   if (use) knn = read;
 }
 
+void read_voxel_votes(YamlSection section, std::optional<VoxelVoteConfig>& votes) {
+  bool use = true;
+  VoxelVoteConfig read;
+  section.boolean("use", use);
+  section.number("edge_m", read.edge_m, {0.02, 10});
+  section.number("height_m", read.height_m, {0.02, 10});
+  section.number("neighbour_weight", read.neighbour_weight, {0, 1});
+  section.number("own_weight", read.own_weight, {0, 1});
+  if (use) votes = read;
+}
+
 std::optional<TrainedSensors> read_trained_for(YamlSection section) {
   TrainedSensors seen;
   section.require({"min_beams", "max_beams", "fov_up_deg", "fov_down_deg"});
@@ -112,6 +123,7 @@ void read_model(YamlSection file, ModelDescription& model) {
   read_statistics(file.section("statistics"), model.statistics);
   read_classes(file.section("classes"), model.classes);
   read_knn(file.section("knn"), model.knn);
+  if (file.has("voxel_votes")) read_voxel_votes(file.section("voxel_votes"), model.voxel_votes);
   if (model.fov_up <= model.fov_down) file.fault("image", "fov_down_deg must be below fov_up_deg");
 }
 

@@ -79,6 +79,7 @@ std::string ModelDescription::faults() const {
               std::to_string(PixelOutputs::max_outputs) + "\n";
   }
   if (knn) faults += knn->faults();
+  if (voxel_votes) faults += voxel_votes->faults();
   return faults;
 }
 

@@ -14,6 +14,7 @@
 #include "core/lidar/sensor_model.hpp"
 #include "core/segmentation/int8_calibration.hpp"
 #include "core/segmentation/knn_postprocess.hpp"
+#include "core/segmentation/voxel_votes.hpp"
 
 namespace stillmap {
 
@@ -88,6 +89,8 @@ struct ModelDescription {
   std::vector<SemanticClass> classes;
   /// Without it a point takes the class of its pixel.
   std::optional<KnnConfig> knn;
+  /// Without it that class is final.
+  std::optional<VoxelVoteConfig> voxel_votes;
   /// Leaves the scan's point 0 out of the image, as lidar-bonnetal's mask does. For parity tests.
   bool mask_first_point = false;
   /// Without it the network cannot run in 8-bit integers.

@@ -151,7 +151,10 @@ PointLabels NetworkSegmenter::segment_with(SegmentationNetwork& network, int col
   const RangeImage image(scan.points_lidar, projection);
   PixelOutputs outputs = network.run(make_network_input(scan, image, model_));
   const PixelLabels pixels = pixel_labels(std::move(outputs), model_);
-  return model_.knn ? knn_labels(image, pixels, *model_.knn) : labels_of_own_pixel(image, pixels);
+  PointLabels labels =
+      model_.knn ? knn_labels(image, pixels, *model_.knn) : labels_of_own_pixel(image, pixels);
+  if (model_.voxel_votes) vote_in_voxels(scan.points_lidar, *model_.voxel_votes, labels);
+  return labels;
 }
 
 namespace {

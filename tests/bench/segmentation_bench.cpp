@@ -86,5 +86,20 @@ void votes(benchmark::State& state) {
 }
 BENCHMARK(votes)->Unit(benchmark::kMillisecond)->UseRealTime();
 
+void votes_in_voxels(benchmark::State& state) {
+  const Scan scan = cli::benchmark_scan();
+  PointLabels labels;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    labels.classes.push_back(static_cast<SemanticClass>(1 + i / 37 % 19));
+    labels.confidence.push_back(0.5F);
+  }
+  for (auto _ : state) {
+    PointLabels voted = labels;
+    vote_in_voxels(scan.points_lidar, {}, voted);
+    benchmark::DoNotOptimize(voted);
+  }
+}
+BENCHMARK(votes_in_voxels)->Unit(benchmark::kMillisecond)->UseRealTime();
+
 }  // namespace
 }  // namespace stillmap

@@ -56,7 +56,22 @@ TEST(ModelFile, ReadsADescriptionThatCanBeUsed) {
   EXPECT_EQ(model.classes,
             (std::vector{SemanticClass::unlabeled, SemanticClass::car, SemanticClass::road}));
   EXPECT_EQ(model.knn->neighbours, 7);
+  EXPECT_FALSE(model.voxel_votes.has_value());
   EXPECT_EQ(model.network_file, test::test_folder() / "model.onnx");
+}
+
+TEST(ModelFile, ReadsVotesInVoxels) {
+  const std::string yaml =
+      sound + "voxel_votes: {edge_m: 0.4, height_m: 0.3, neighbour_weight: 0.25}\n";
+  const ModelDescription model = load_model(yaml);
+  ASSERT_TRUE(model.voxel_votes.has_value());
+  EXPECT_EQ(model.voxel_votes->edge_m, 0.4);
+  EXPECT_EQ(model.voxel_votes->height_m, 0.3);
+  EXPECT_EQ(model.voxel_votes->neighbour_weight, 0.25);
+  EXPECT_EQ(model.voxel_votes->own_weight, 0.3);
+  EXPECT_FALSE(load_model(sound + "voxel_votes: {use: false}\n").voxel_votes.has_value());
+  EXPECT_THAT(refusal_of(yaml, "edge_m: 0.4", "edge_m: 0"), HasSubstr("voxel_votes.edge_m"));
+  EXPECT_THAT(refusal_of(yaml, "0.25", "2"), HasSubstr("voxel_votes.neighbour_weight"));
 }
 
 TEST(ModelFile, ReadsWhetherTheNetworkTakesTheSlope) {

@@ -108,6 +108,20 @@ TEST(NetworkSegmenter, LetsTheNeighboursVoteWhenAsked) {
   EXPECT_NE(voted.classes, own.classes);
 }
 
+TEST(NetworkSegmenter, LetsVoxelsVoteAfterTheImageWhenAsked) {
+  Fixture fixture;
+  fixture.model.knn = KnnConfig{};
+  const Scan scan = random_scan(600, 4);
+  const PointLabels before = open_model(fixture.model)->segment(scan);
+  fixture.model.voxel_votes = VoxelVoteConfig{.edge_m = 2.0, .height_m = 2.0};
+  const PointLabels voted = open_model(fixture.model)->segment(scan);
+  PointLabels expected = before;
+  vote_in_voxels(scan.points_lidar, *fixture.model.voxel_votes, expected);
+  EXPECT_EQ(voted.classes, expected.classes);
+  EXPECT_EQ(voted.confidence, expected.confidence);
+  EXPECT_NE(voted.classes, before.classes);
+}
+
 TEST(NetworkSegmenter, GivesNoLabelsForAnEmptyScan) {
   EXPECT_TRUE(open_model(Fixture().model)->segment({}).empty());
 }

@@ -35,7 +35,7 @@ namespace {
 struct SegmentationTiming {
   double projection_ms = 0.0;
   double network_ms = 0.0;
-  double knn_ms = 0.0;
+  double votes_ms = 0.0;
   /// Operations a second of the network, and of a matrix product just before [10^9].
   double gops = 0.0;
   double peak_gops = 0.0;
@@ -145,7 +145,10 @@ SegmentationTiming time_segmentation(const ModelDescription& model, const TimedE
   const RangeImage image(scan.points_lidar, model.projection());
   const PixelLabels pixels = pixel_labels(std::move(outputs), model);
   const KnnConfig knn = model.knn.value_or(KnnConfig{});
-  timing.knn_ms = median_ms([&] { (void)knn_labels(image, pixels, knn); });
+  timing.votes_ms = median_ms([&] {
+    PointLabels labels = knn_labels(image, pixels, knn);
+    if (model.voxel_votes) vote_in_voxels(scan.points_lidar, *model.voxel_votes, labels);
+  });
   return timing;
 }
 
@@ -171,13 +174,13 @@ std::uint32_t whole_number(const std::string& option, const std::string& text, s
 
 std::vector<std::string> row(const ModelDescription& model, const std::string& engine,
                              const SegmentationTiming& timing) {
-  const double total = timing.projection_ms + timing.network_ms + timing.knn_ms;
+  const double total = timing.projection_ms + timing.network_ms + timing.votes_ms;
   return {model.name,
           std::to_string(model.rows) + "x" + std::to_string(model.columns),
           engine,
           fixed(timing.projection_ms, 1),
           fixed(timing.network_ms, 1),
-          fixed(timing.knn_ms, 1),
+          fixed(timing.votes_ms, 1),
           fixed(total, 1),
           fixed(timing.gops, 0),
           fixed(timing.peak_gops, 0),
@@ -254,7 +257,7 @@ ExitCode run(const ModelSpeedArguments& arguments) {
                         ? benchmark_scan()
                         : open_recording(arguments.dataset, arguments.topic_in).read(0).scan;
   if (!arguments.beside.empty()) return run_beside_load(arguments, scan);
-  Table table({"network", "image", "engine", "project ms", "network ms", "k-NN ms", "total ms",
+  Table table({"network", "image", "engine", "project ms", "network ms", "votes ms", "total ms",
                "Gop/s", "peak", "%", "MB"});
   for (const std::string& model_path : arguments.models) {
     for (const std::string& columns : arguments.columns) {
@@ -280,7 +283,7 @@ ExitCode run(const ModelSpeedArguments& arguments) {
 void add_model_speed_command(CommandHandle model, Action& action) {
   auto arguments = std::make_shared<ModelSpeedArguments>();
   CommandHandle command =
-      model.command("speed", "Time projection, network and k-NN on every engine");
+      model.command("speed", "Time projection, network and votes on every engine");
   command.option("MODEL", arguments->models, "Model folders or ONNX files").required();
   command.option("--columns", arguments->columns, "Columns of the image: 512,1024,2048")
       .comma_separated()

@@ -57,6 +57,8 @@ def describe_run(arguments, state):
         class_names(),
         config["knn"],
         config["follow_sensor"],
+        # A run from before there were any has none.
+        config.get("voxel_votes"),
     )
 
 

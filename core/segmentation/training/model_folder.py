@@ -28,10 +28,12 @@ def export_onnx(network, file, shape, free_size):
     )
 
 
-def describe(words, image, mean, deviation, classes, knn, follow_sensor=False):
+def describe(
+    words, image, mean, deviation, classes, knn, follow_sensor=False, voxel_votes=None
+):
     """The content of model.yaml. `words`: name, licence, sensor, trained_for, training,
     accuracy; `classes`: name of the class of each output; `knn`: None, or neighbours, window, sigma,
-    cutoff_m."""
+    cutoff_m; `voxel_votes`: None, or edge_m, height_m, neighbour_weight, own_weight."""
     return {
         **words,
         "image": {**image, "follow_sensor": follow_sensor},
@@ -41,6 +43,7 @@ def describe(words, image, mean, deviation, classes, knn, follow_sensor=False):
         },
         "classes": dict(enumerate(classes)),
         "knn": {"use": knn is not None, **(knn or {})},
+        "voxel_votes": {"use": voxel_votes is not None, **(voxel_votes or {})},
     }
 
 
