@@ -477,7 +477,7 @@ std::vector<Eigen::Isometry3d> LoopCloser::poses_by(
 
 std::size_t LoopCloser::submap_bytes() const {
   std::size_t bytes = 0;
-  for (const PlacedSubmap& placed : submaps_) bytes += placed.submap.bytes();
+  for (const PlacedSubmap& placed : submaps_) bytes += placed.bytes();
   return bytes;
 }
 

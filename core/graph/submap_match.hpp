@@ -51,6 +51,8 @@ struct PlacedSubmap {
   explicit PlacedSubmap(Submap its_submap)
       : submap(std::move(its_submap)), image(submap.points_submap) {}
 
+  [[nodiscard]] std::size_t bytes() const { return submap.bytes() + image.bytes(); }
+
   Submap submap;
   UprightImage image;
 };

@@ -29,6 +29,11 @@ class UprightImage {
   /// Corner of cell 0, 0 [m].
   [[nodiscard]] const Eigen::Vector2f& corner_submap() const { return corner_; }
 
+  [[nodiscard]] std::size_t bytes() const {
+    return sizeof(*this) + cells_.capacity() * sizeof(Cell) +
+           upright_.capacity() * sizeof(Eigen::Vector2f);
+  }
+
  private:
   struct Cell {
     float lowest = 0.0F;

@@ -21,6 +21,16 @@ TEST(UprightImage, TellsWhatStandsFromGround) {
   EXPECT_TRUE(UprightImage(std::span<const Eigen::Vector3f>()).upright_submap().empty());
 }
 
+TEST(UprightImage, CountsTheMemoryOfItsCells) {
+  std::vector<Eigen::Vector3f> points{{0.0F, 0.0F, 0.0F}, {99.9F, 49.9F, 0.0F}};
+  const UprightImage image(points);
+  const auto cells =
+      static_cast<std::size_t>(image.columns()) * static_cast<std::size_t>(image.rows());
+  EXPECT_GE(cells, 200U * 100U);
+  EXPECT_GE(image.bytes(), cells * 2 * sizeof(float));
+  EXPECT_LE(image.bytes(), cells * 32 + 1000);
+}
+
 TEST(AlignInPlan, FindsAPlaceSeenFromTheOtherLaneBackwards) {
   const StreetWorld world(5);
   const Submap a = world.submap_at(0.0, 25.0, false, 1);
