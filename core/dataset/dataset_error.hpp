@@ -13,6 +13,12 @@ class DatasetError : public std::runtime_error {
       : std::runtime_error(file.string() + ": " + fault) {}
 };
 
+/// Poses are those of a camera, and no file tells where on the lidar it is.
+class CameraUnknownError : public DatasetError {
+ public:
+  using DatasetError::DatasetError;
+};
+
 /// One that cannot be written: nothing is wrong with what was asked for, the disk may be full.
 class DatasetWriteError : public DatasetError {
  public:

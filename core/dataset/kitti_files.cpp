@@ -155,9 +155,9 @@ Eigen::Isometry3d read_kitti_calibration(const std::filesystem::path& file) {
     if (!line.starts_with(key)) continue;
     return pose_from(file, "\"Tr:\"", numbers_in(std::string_view(line).substr(key.size())));
   }
-  throw DatasetError(file,
-                     "has no entry \"Tr:\" (lidar to camera); take calib.txt of the "
-                     "SemanticKITTI sequence");
+  throw CameraUnknownError(file,
+                           "has no entry \"Tr:\" (lidar to camera); take calib.txt of the "
+                           "SemanticKITTI sequence");
 }
 
 void write_kitti_calibration(const std::filesystem::path& file,

@@ -26,7 +26,7 @@ void write_kitti_labels(const std::filesystem::path& file, std::span<const std::
 /// The network's class of each raw label.
 [[nodiscard]] std::vector<SemanticClass> reduced_classes(std::span<const std::uint32_t> raw_labels);
 
-/// `T_camera_lidar`: entry "Tr:" of KITTI's calib.txt.
+/// `T_camera_lidar`: entry "Tr:" of KITTI's calib.txt. Throws CameraUnknownError without one.
 [[nodiscard]] Eigen::Isometry3d read_kitti_calibration(const std::filesystem::path& file);
 void write_kitti_calibration(const std::filesystem::path& file,
                              const Eigen::Isometry3d& T_camera_lidar);

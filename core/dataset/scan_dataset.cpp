@@ -333,9 +333,10 @@ std::optional<Trajectory> ScanDataset::truth() const {
   if (!in_lidar_frame) {
     const fs::path calibration = sequence_ / "calib.txt";
     if (!fs::exists(calibration)) {
-      throw DatasetError(calibration,
-                         "no such file, and poses.txt is in the camera frame; add the sequence's "
-                         "calib.txt, or poses in the lidar frame as poses_lidar.txt");
+      throw CameraUnknownError(
+          calibration,
+          "no such file, and poses.txt is in the camera frame; add the sequence's "
+          "calib.txt, or poses in the lidar frame as poses_lidar.txt");
     }
     T_map_lidar = lidar_poses_from_camera(T_map_lidar, read_kitti_calibration(calibration));
   }

@@ -52,8 +52,8 @@ class ScanDataset {
   [[nodiscard]] DatasetFrame read_uncorrected(std::size_t i) const;
 
   /// True poses, one a scan, in the lidar frame of the pose file's first line; nothing without a
-  /// pose file. Throws DatasetError when it is damaged, has too few lines, or is in the camera
-  /// frame and there is no calib.txt.
+  /// pose file. Throws DatasetError when it is damaged, or has too few lines,
+  /// CameraUnknownError when it is in the camera's frame and no calib.txt tells where that is.
   [[nodiscard]] std::optional<Trajectory> truth() const;
 
   /// Samples of an IMU by the scans' clock: imu.csv or imu.txt beside velodyne/ or the scans' files

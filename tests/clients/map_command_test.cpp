@@ -131,11 +131,24 @@ TEST_F(MapCommandTest, ADamagedFirstScanIsSkippedAsAnyOther) {
 
 TEST_F(MapCommandTest, AFaultyTruthIsSaidBeforeAnythingIsMapped) {
   simulate("city", 3);
-  std::filesystem::remove(folder_ / "city/calib.txt");
+  write("city/poses.txt", "1 0 0\n");
   const ProcessResult refused = map_city();
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.err, HasSubstr("calib.txt"));
+  EXPECT_THAT(refused.err, HasSubstr("poses.txt"));
   EXPECT_FALSE(exists("out"));
+}
+
+// As SemanticKITTI's labels come with KITTI's own calib.txt of the cameras alone.
+TEST_F(MapCommandTest, MapsWithoutAccuracyWhereThePosesAreThoseOfACameraSomewhere) {
+  simulate("city");
+  write("city/calib.txt", "P0: 718.856 0 607.1928 0 0 718.856 185.2157 0 0 0 1 0\n");
+  const ProcessResult result = map_city("--json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err,
+              AllOf(HasSubstr("without accuracy"), HasSubstr("calib.txt"), HasSubstr("\"Tr:\"")));
+  EXPECT_TRUE(nlohmann::json::parse(result.out).at("accuracy").is_null());
+  EXPECT_TRUE(exists("out/map.stillmap"));
+  EXPECT_FALSE(exists("out/trajectory.png"));
 }
 
 TEST_F(MapCommandTest, ReplacesAllResultsOfAnEarlierRun) {

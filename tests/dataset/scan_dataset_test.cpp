@@ -307,7 +307,7 @@ TEST(ScanDataset, CameraPosesWithoutCalibrationAreAnError) {
   std::filesystem::remove(folder.path() / "calib.txt");
   const ScanDataset dataset(folder.path());
   EXPECT_THAT(
-      message_of<DatasetError>([&] { (void)dataset.truth(); }),
+      message_of<CameraUnknownError>([&] { (void)dataset.truth(); }),
       AllOf(HasSubstr("calib.txt"), HasSubstr("camera frame"), HasSubstr("poses_lidar.txt")));
 }
 

@@ -38,10 +38,22 @@
 namespace stillmap::cli {
 namespace {
 
-// True poses of the body at the mapped scans, in its frame at the first of them.
-std::optional<Trajectory> truth_of(const ScanDataset& dataset, const MappingResult& result,
-                                   const MappedBody& body) {
-  std::optional<Trajectory> all = dataset.truth();
+/// A map needs no true poses: where those of the data set are a camera's, and it is not known where
+/// the camera is, they are left out, and that is said.
+std::optional<Trajectory> usable_truth(const ScanDataset& dataset) {
+  try {
+    return dataset.truth();
+  } catch (const CameraUnknownError& error) {
+    std::cerr << "stillmap: without accuracy, its true poses cannot be used: " << error.what()
+              << "\n";
+    return std::nullopt;
+  }
+}
+
+// True poses of the body at the mapped scans, in its frame at the first of them. `all`: the
+// lidar's, one a scan.
+std::optional<Trajectory> truth_of(const std::optional<Trajectory>& all,
+                                   const MappingResult& result, const MappedBody& body) {
   if (!all || result.trajectory.empty()) return std::nullopt;
   const Eigen::Isometry3d T_first_world =
       all->at(result.scan_of_pose.front()).T_map_lidar.inverse();
@@ -123,7 +135,7 @@ void write_loops(const std::filesystem::path& folder, const MappingResult& resul
 /// Writes poses_lidar.txt or poses_base.txt, poses_tum.txt, map.stillmap, map.ply, map.pcd, map.png
 /// and, with truth, trajectory.png and trajectory_error.png; what closed loops leave, where they
 /// were looked for. Throws what their writers throw.
-MapOutput write_map_output(const MapOutputFolder& out, const ScanDataset& dataset,
+MapOutput write_map_output(const MapOutputFolder& out, const std::optional<Trajectory>& truth,
                            const std::string& source, const EarlierMap* earlier,
                            const MappingResult& result, const MapperConfig& config,
                            const MappedBody& body) {
@@ -138,7 +150,7 @@ MapOutput write_map_output(const MapOutputFolder& out, const ScanDataset& datase
   export_ply(*result.view, folder / "map.ply");
   export_pcd(*result.view, folder / "map.pcd");
   MapPictureOptions picture;
-  picture.truth = truth_of(dataset, result, body);
+  picture.truth = truth_of(truth, result, body);
   if (picture.truth && earlier != nullptr) {
     for (StampedPose& pose : *picture.truth)
       pose.T_map_lidar = result.trajectory.front().T_map_lidar * pose.T_map_lidar;
@@ -359,7 +371,7 @@ ExitCode run(const MapArguments& arguments) {
   static_cast<void>(arguments.range.end(dataset));
   static_cast<void>(denied_loops(arguments, dataset));
   static_cast<void>(gnss_options(arguments, dataset, body));
-  static_cast<void>(dataset.truth());
+  const std::optional<Trajectory> truth = usable_truth(dataset);
   auto labels = make_segmenter(arguments.mapper, dataset);
   const std::unique_ptr<const EarlierMap> earlier = earlier_map(arguments, config);
   std::cerr << describe_model(arguments.mapper, dataset, *labels);
@@ -381,7 +393,7 @@ ExitCode run(const MapArguments& arguments) {
            "of before were dropped\n";
   }
   const MapOutput output =
-      write_map_output(out, dataset, arguments.dataset, earlier.get(), result, config, body);
+      write_map_output(out, truth, arguments.dataset, earlier.get(), result, config, body);
   const Json report = to_json(result, output);
   write_report(out.unfinished() / "report.json", report);
   out.publish(result.stopped);
