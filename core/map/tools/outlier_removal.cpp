@@ -1,27 +1,63 @@
 #include "core/map/tools/outlier_removal.hpp"
 
-#include <pcl/filters/statistical_outlier_removal.h>
-#include <pcl/point_cloud.h>
-#include <pcl/point_types.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 
 #include <cmath>
-#include <memory>
+#include <cstddef>
+#include <nanoflann.hpp>
+#include <numeric>
 #include <sstream>
 #include <stdexcept>
 
 namespace stillmap {
 namespace {
 
-using Cloud = pcl::PointCloud<pcl::PointXYZ>;
+/// Voxels as nanoflann sees points.
+struct VoxelCloud {
+  const std::vector<QueryVoxel>& voxels;
 
-std::shared_ptr<const Cloud> cloud_of(const std::vector<QueryVoxel>& voxels) {
-  auto cloud = std::make_shared<Cloud>();
-  cloud->reserve(voxels.size());
-  for (const QueryVoxel& voxel : voxels) {
-    const Eigen::Vector3f& position = voxel.position_map;
-    cloud->emplace_back(position.x(), position.y(), position.z());
+  [[nodiscard]] std::size_t kdtree_get_point_count() const { return voxels.size(); }
+  [[nodiscard]] float kdtree_get_pt(std::size_t voxel, std::size_t axis) const {
+    return voxels[voxel].position_map[static_cast<Eigen::Index>(axis)];
   }
-  return cloud;
+  template <class Box>
+  bool kdtree_get_bbox(Box& /*box*/) const {
+    return false;
+  }
+};
+
+using VoxelTree =
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, VoxelCloud>, VoxelCloud,
+                                        3, std::size_t>;
+
+/// Of each voxel, to its nearest others [m].
+std::vector<double> mean_distances(const std::vector<QueryVoxel>& voxels, int neighbours) {
+  const VoxelCloud cloud{voxels};
+  const VoxelTree tree(3, cloud);
+  // Nearest of all is the voxel itself, or one at its very place.
+  const auto wanted = static_cast<std::size_t>(neighbours) + 1;
+  std::vector<double> means(voxels.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, voxels.size(), 1024), [&](const auto& some) {
+    std::vector<std::size_t> nearest(wanted);
+    std::vector<float> squared(wanted);
+    for (std::size_t i = some.begin(); i < some.end(); ++i) {
+      tree.knnSearch(voxels[i].position_map.data(), wanted, nearest.data(), squared.data());
+      double sum = 0.0;
+      for (std::size_t k = 1; k < wanted; ++k) sum += std::sqrt(static_cast<double>(squared[k]));
+      means[i] = sum / neighbours;
+    }
+  });
+  return means;
+}
+
+/// Mean plus `sigma` standard deviations.
+double upper_limit(const std::vector<double>& values, double sigma) {
+  const auto count = static_cast<double>(values.size());
+  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / count;
+  double squares = 0.0;
+  for (const double value : values) squares += (value - mean) * (value - mean);
+  return mean + sigma * std::sqrt(squares / (count - 1.0));
 }
 
 }  // namespace
@@ -41,21 +77,18 @@ std::vector<QueryVoxel> without_outliers(const std::vector<QueryVoxel>& voxels,
   if (const std::string faults = config.faults(); !faults.empty()) {
     throw std::invalid_argument(faults);
   }
-  // PCL would read past the end of what it finds.
   if (voxels.size() <= static_cast<std::size_t>(config.neighbours)) {
     throw std::invalid_argument("outliers cannot be told among " + std::to_string(voxels.size()) +
                                 " voxels with " + std::to_string(config.neighbours) +
                                 " neighbours each; take fewer neighbours, or more of the map");
   }
-  pcl::StatisticalOutlierRemoval<pcl::PointXYZ> filter;
-  filter.setInputCloud(cloud_of(voxels));
-  filter.setMeanK(config.neighbours);
-  filter.setStddevMulThresh(config.sigma);
-  pcl::Indices kept;
-  filter.filter(kept);
+  const std::vector<double> distances = mean_distances(voxels, config.neighbours);
+  const double limit = upper_limit(distances, config.sigma);
   std::vector<QueryVoxel> rest;
-  rest.reserve(kept.size());
-  for (const auto i : kept) rest.push_back(voxels[static_cast<std::size_t>(i)]);
+  rest.reserve(voxels.size());
+  for (std::size_t i = 0; i < voxels.size(); ++i) {
+    if (distances[i] <= limit) rest.push_back(voxels[i]);
+  }
   return rest;
 }
 
