@@ -93,8 +93,8 @@ void read_voxel_votes(YamlSection section, std::optional<VoxelVoteConfig>& votes
   bool use = true;
   VoxelVoteConfig read;
   section.boolean("use", use);
-  section.number("edge_m", read.edge_m, {0.02, 10});
-  section.number("height_m", read.height_m, {0.02, 10});
+  section.number("edge_m", read.edge_m, {0.05, 10});
+  section.number("height_m", read.height_m, {0.05, 10});
   section.number("neighbour_weight", read.neighbour_weight, {0, 1});
   section.number("own_weight", read.own_weight, {0, 1});
   if (use) votes = read;

@@ -52,7 +52,7 @@ class ScanDataset {
   [[nodiscard]] DatasetFrame read_uncorrected(std::size_t i) const;
 
   /// True poses, one a scan, in the lidar frame of the pose file's first line; nothing without a
-  /// pose file. Throws DatasetError when it is damaged, or has too few lines,
+  /// pose file. Throws DatasetError when it is damaged, or has too few lines; before that
   /// CameraUnknownError when it is in the camera's frame and no calib.txt tells where that is.
   [[nodiscard]] std::optional<Trajectory> truth() const;
 

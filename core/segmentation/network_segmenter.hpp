@@ -17,7 +17,8 @@ namespace stillmap {
 /// The classes of a network's outputs; unlabeled for PixelOutputs::no_output.
 [[nodiscard]] PixelLabels pixel_labels(PixelOutputs&& outputs, const ModelDescription& model);
 
-/// Labels from a network on range images (RangeNet++): projection, inference, k-NN post-processing.
+/// Labels from a network on range images (RangeNet++): projection, inference, votes of the
+/// pixels around a point and of the voxels.
 class NetworkSegmenter final : public Segmenter {
  public:
   /// `network` was opened for `model`, which has no faults. `remark` is appended to details().

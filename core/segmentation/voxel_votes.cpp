@@ -230,7 +230,7 @@ void vote_in_voxels(std::span<const Eigen::Vector3f> points_lidar, const VoxelVo
                     PointLabels& labels) {
   assert(config.faults().empty());
   assert(labels.classes.size() == points_lidar.size());
-  assert(points_lidar.size() <= point_mask);
+  if (points_lidar.size() > point_mask) return;
   const std::vector<VoxelAndPoint> voters = voters_by_voxel(points_lidar, config, labels);
   const VotingVoxels voxels(voters, labels);
   const tbb::blocked_range<std::size_t> all(0, voxels.numbers().size(), 2048);

@@ -29,8 +29,9 @@ struct VoxelVoteConfig {
 /// votes in its voxel and those around it than its own class with `own_weight` times its confidence
 /// times all votes there; ties keep its own, among others they go to the lowest class. Its
 /// confidence is then the sum of the winning votes divided by the number of points that voted, both
-/// weighted. Points without a class, and those further than some 800 m (200 m in height) from the
-/// lidar, neither vote nor change. `labels` is as long as `points_lidar`.
+/// weighted. Points without a class, and those further than 4,000 edges or 2,000 heights from the
+/// lidar, neither vote nor change, nor does any in a cloud of more than 67 million. `labels` is as
+/// long as `points_lidar`.
 void vote_in_voxels(std::span<const Eigen::Vector3f> points_lidar, const VoxelVoteConfig& config,
                     PointLabels& labels);
 

@@ -78,6 +78,21 @@ TEST(OutlierRemoval, TakesPlantedOutliersAndNothingElse) {
       rest, [](const QueryVoxel& voxel) { return voxel.label == SemanticClass::building; }));
 }
 
+// Distances differ by rounding alone.
+TEST(OutlierRemoval, LeavesARegularGridAsItIs) {
+  for (const float x_m : {0.0F, 50.0F}) {
+    std::vector<QueryVoxel> voxels;
+    for (int i = 0; i < 900; ++i) {
+      voxels.push_back(voxel_at(x_m + 0.1F * static_cast<float>(i % 30),
+                                0.1F * static_cast<float>(i / 30), 0.0F, SemanticClass::road));
+    }
+    for (const int neighbours : {1, 2}) {
+      EXPECT_EQ(without_outliers(voxels, {.neighbours = neighbours, .sigma = 3.0}).size(), 900U)
+          << x_m << " m, " << neighbours;
+    }
+  }
+}
+
 TEST(OutlierRemoval, AgreesWithASearchThroughAllVoxels) {
   std::mt19937 random(11);
   std::normal_distribution<float> coordinate(0.0F, 5.0F);

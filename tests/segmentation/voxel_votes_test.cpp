@@ -119,6 +119,7 @@ TEST(VoxelVotes, AreThoseOfTheReference) {
     expect_like_reference(RandomCloud(seed, 3000, 1.5F), {});
     expect_like_reference(RandomCloud(seed, 20'000, 3.0F),
                           {.edge_m = 0.35, .height_m = 0.5, .neighbour_weight = 0.2});
+    expect_like_reference(RandomCloud(seed, 3000, 1.5F), {.own_weight = 0.05});
   }
 }
 
@@ -155,28 +156,36 @@ TEST(VoxelVotes, LeaveATie) {
   EXPECT_EQ(labels.classes, (std::vector{SemanticClass::fence, SemanticClass::car}));
 }
 
+/// Of a car's point, with a road at `road` that would outvote it if they were neighbours.
+SemanticClass class_beside_road(const Eigen::Vector3f& car, const Eigen::Vector3f& road) {
+  const std::vector<Eigen::Vector3f> points{car, road, road};
+  PointLabels labels{.classes = {SemanticClass::car, SemanticClass::road, SemanticClass::road},
+                     .confidence = {0.1F, 1.0F, 1.0F}};
+  vote_in_voxels(points, {}, labels);
+  return labels.classes[0];
+}
+
 TEST(VoxelVotes, PassOverPointsThatLieNowhereOrTooFar) {
   constexpr float infinity = std::numeric_limits<float>::infinity();
   constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-  const std::vector<Eigen::Vector3f> points{{nan, 0, 0},     {0, infinity, 0},   {0, 0, -infinity},
-                                            {1e30F, 0, 0},   {0, -819.5F, 0},    {0, 0, 204.9F},
-                                            {-819.0F, 0, 0}, {818.5F, 0, 204.0F}};
-  PointLabels labels{.classes = std::vector(points.size(), SemanticClass::car),
-                     .confidence = std::vector(points.size(), 0.5F)};
-  const PointLabels before = labels;
-  vote_in_voxels(points, {}, labels);
-  EXPECT_EQ(labels.classes, before.classes);
-  EXPECT_EQ(labels.confidence, before.confidence);
+  const Eigen::Vector3f far_away(-800.1F, 3.1F, -200.05F);
+  ASSERT_EQ(class_beside_road(far_away, far_away), SemanticClass::road);
+  for (const Eigen::Vector3f& nowhere :
+       {Eigen::Vector3f(nan, 0.1F, 0.05F), Eigen::Vector3f(0.1F, infinity, 0.05F),
+        Eigen::Vector3f(0.1F, 0.1F, -infinity), Eigen::Vector3f(1e30F, 0.1F, 0.05F),
+        Eigen::Vector3f(0.1F, -819.3F, 0.05F), Eigen::Vector3f(0.1F, 0.1F, 204.75F)}) {
+    EXPECT_EQ(class_beside_road(nowhere, nowhere), SemanticClass::car) << nowhere.transpose();
+  }
 }
 
-// At the last voxel of a column the next one's number is that of the first voxel of the column
-// beside.
+// After the last number of a column comes the first of the column beside.
 TEST(VoxelVotes, DoNotReachFromOneColumnsTopToTheNextOnesFoot) {
-  const std::vector<Eigen::Vector3f> points{{0.1F, 0.1F, 204.55F}, {0.1F, 0.3F, -204.55F}};
-  PointLabels labels{.classes = {SemanticClass::car, SemanticClass::road},
-                     .confidence = {0.1F, 1.0F}};
-  vote_in_voxels(points, {}, labels);
-  EXPECT_EQ(labels.classes, (std::vector{SemanticClass::car, SemanticClass::road}));
+  const Eigen::Vector3f top(0.1F, 0.1F, 204.75F);
+  for (const float y_m : {0.1F, 0.3F, 0.5F}) {
+    const Eigen::Vector3f foot(0.1F, y_m, -204.75F);
+    EXPECT_EQ(class_beside_road(top, foot), SemanticClass::car) << y_m;
+    EXPECT_EQ(class_beside_road(foot, top), SemanticClass::car) << y_m;
+  }
 }
 
 TEST(VoxelVotes, TakeNoPoints) {

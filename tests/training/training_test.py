@@ -340,6 +340,8 @@ class Training(unittest.TestCase):
             description["trained_for"],
             {"min_beams": 64, "max_beams": 64, "fov_up_deg": 3, "fov_down_deg": -25},
         )
+        self.assertEqual(description["voxel_votes"]["use"], True)
+        self.assertEqual(description["voxel_votes"]["height_m"], 0.1)
         image = description["image"]
         self.assertEqual((image["columns"], image["min_columns"]), (256, 128))
         # A run from that model begins where this one ended.

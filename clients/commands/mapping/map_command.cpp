@@ -44,7 +44,7 @@ std::optional<Trajectory> usable_truth(const ScanDataset& dataset) {
   try {
     return dataset.truth();
   } catch (const CameraUnknownError& error) {
-    std::cerr << "stillmap: without accuracy, its true poses cannot be used: " << error.what()
+    std::cerr << "stillmap: without accuracy, since the true poses cannot be used: " << error.what()
               << "\n";
     return std::nullopt;
   }

@@ -51,13 +51,14 @@ std::vector<double> mean_distances(const std::vector<QueryVoxel>& voxels, int ne
   return means;
 }
 
-/// Mean plus `sigma` standard deviations.
+/// Mean plus `sigma` standard deviations, and what rounding makes of equal distances.
 double upper_limit(const std::vector<double>& values, double sigma) {
   const auto count = static_cast<double>(values.size());
   const double mean = std::accumulate(values.begin(), values.end(), 0.0) / count;
   double squares = 0.0;
   for (const double value : values) squares += (value - mean) * (value - mean);
-  return mean + sigma * std::sqrt(squares / (count - 1.0));
+  constexpr double rounding = 1e-4;
+  return (1.0 + rounding) * mean + sigma * std::sqrt(squares / (count - 1.0));
 }
 
 }  // namespace
