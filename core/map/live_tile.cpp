@@ -209,6 +209,10 @@ void LiveTile::add_misses(LiveVoxel& voxel, std::uint32_t misses) {
 
 void LiveTile::forget_beyond(LiveVoxel& voxel, std::uint32_t max_scans,
                              const VisibilityRule& rule) {
+  if (voxel.misses == misses_of_rest) {
+    voxel.hits = static_cast<std::uint16_t>(std::min<std::uint32_t>(voxel.hits, max_scans));
+    return;
+  }
   const bool was_seen_through = is_seen_through(voxel, rule);
   const double max_missing =
       std::max<double>(trust_in(voxel, rule) * rule.misses_to_clear,

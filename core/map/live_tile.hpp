@@ -118,9 +118,8 @@ class LiveTile {
   friend class TileCorrection;
 
   static constexpr std::size_t min_changed_voxels = 16;
-  static constexpr std::uint16_t max_misses = 1000;
-  /// In place of misses: hidden as the rest of something that moved on, until it is seen again.
-  static constexpr std::uint16_t misses_of_rest = max_misses + 1;
+  static constexpr std::uint16_t max_misses = VoxelHistory::max_misses;
+  static constexpr std::uint16_t misses_of_rest = VoxelHistory::misses_of_rest;
 
   struct LiveVoxel {
     PackedVoxel packed;

@@ -13,8 +13,9 @@ constexpr std::int64_t max_seen_ns = 500'000'000;
 /// So long after a voxel was seen last it will not be seen for longer, nor what was seen with it.
 constexpr std::int64_t settled_after_ns = max_seen_ns + max_apart_ns;
 
+/// Where the clock was set back, what was seen last has the earlier stamp.
 std::int64_t seen_ns(std::uint32_t first_scan, std::uint32_t last_scan, const ScanStamps& stamps) {
-  return stamps.stamp_ns(last_scan) - stamps.stamp_ns(first_scan);
+  return std::abs(stamps.stamp_ns(last_scan) - stamps.stamp_ns(first_scan));
 }
 
 }  // namespace
@@ -64,7 +65,7 @@ bool LiveTile::hide_rest_of_movers(const ScanStamps& stamps, std::int64_t now_ns
   for (const std::uint32_t key : hidden_) {
     const std::uint32_t position = index_.find(key, key_at());
     if (position == PositionIndex::none || is_shown(at(position), rule)) continue;
-    const std::int64_t age_ns = now_ns - stamps.stamp_ns(at(position).last_scan);
+    const std::int64_t age_ns = std::abs(now_ns - stamps.stamp_ns(at(position).last_scan));
     (age_ns < settled_after_ns ? later : front).push_back(key);
   }
   hidden_ = std::move(later);

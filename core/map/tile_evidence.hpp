@@ -11,6 +11,10 @@ namespace stillmap {
 
 /// Counters that decide whether a voxel is shown.
 struct VoxelHistory {
+  static constexpr std::uint16_t max_misses = 1000;
+  /// In place of misses: hidden as the rest of something that moved on, until it is seen again.
+  static constexpr std::uint16_t misses_of_rest = max_misses + 1;
+
   /// Scans that hit it, and scans that saw through it.
   std::uint16_t hits = 0;
   std::uint16_t misses = 0;

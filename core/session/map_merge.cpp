@@ -9,6 +9,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "core/lidar/voxel_index.hpp"
@@ -82,6 +83,14 @@ std::uint16_t sum_of(std::uint16_t a, std::uint16_t b, unsigned max) {
   return static_cast<std::uint16_t>(std::min(unsigned{a} + b, max));
 }
 
+/// That one map has it as the rest of something that moved on says nothing against what the other
+/// one saw there.
+std::uint16_t misses_of_both(std::uint16_t a, std::uint16_t b) {
+  constexpr std::uint16_t of_rest = VoxelHistory::misses_of_rest;
+  if (a == of_rest || b == of_rest) return std::min(a, b);
+  return sum_of(a, b, VoxelHistory::max_misses);
+}
+
 ClassEvidence sum_of(const ClassEvidence& a, const ClassEvidence& b) {
   std::array<float, semantic_class_count> weights{};
   for (const ClassEvidence* const evidence : {&a, &b})
@@ -111,7 +120,7 @@ void add_to(MergedTile& tile, const MergedVoxel& more) {
   voxel.first_seen_ns = std::min(voxel.first_seen_ns, more.voxel.first_seen_ns);
   voxel.last_seen_ns = std::max(voxel.last_seen_ns, more.voxel.last_seen_ns);
   history.hits = sum_of(history.hits, more.history.hits, max_points);
-  history.misses = sum_of(history.misses, more.history.misses, 1000);
+  history.misses = misses_of_both(history.misses, more.history.misses);
   history.was_shown |= more.history.was_shown;
   history.is_restored |= more.history.is_restored;
 }
@@ -215,13 +224,13 @@ std::shared_ptr<const TileEvidence> to_evidence(TileId id, const MergedTile& mer
   return evidence;
 }
 
-/// As the map's own: a voxel that a map shows has so many points.
+/// A voxel that the map shows has so many points.
 std::uint32_t least_points_shown(const SavedMap& map) {
-  std::uint32_t least = std::numeric_limits<std::uint16_t>::max();
+  std::optional<std::uint32_t> least;
   for (const auto& tile : map.view.tiles)
     for (const PackedVoxel& voxel : tile->voxels.packed())
-      least = std::min<std::uint32_t>(least, voxel.point_count);
-  return std::max(least, 1U);
+      least = std::min<std::uint32_t>(least.value_or(voxel.point_count), voxel.point_count);
+  return std::max(least.value_or(1U), 1U);
 }
 
 }  // namespace
@@ -276,8 +285,8 @@ MapAlignment align_maps(const std::shared_ptr<const PlaceIndex>& map, const Plac
 }
 
 SavedMap merged_map(const SavedMap& map, const SavedMap& other,
-                    const std::vector<Eigen::Isometry3d>& T_map_pose,
-                    std::int64_t clock_offset_ns) {
+                    const std::vector<Eigen::Isometry3d>& T_map_pose, std::int64_t clock_offset_ns,
+                    StaticMapConfig config) {
   assert(T_map_pose.size() == other.trajectory.size());
   const VoxelGrid grid(map.view.voxel_size_m, map.view.tile_size_m);
   const Mover mover(other, T_map_pose, clock_offset_ns, grid);
@@ -300,10 +309,9 @@ SavedMap merged_map(const SavedMap& map, const SavedMap& other,
     }
     changed.emplace(id, to_evidence(id, tile, grid));
   }
-  StaticMapConfig config;
   config.voxel_size_m = map.view.voxel_size_m;
   config.tile_size_m = map.view.tile_size_m;
-  config.min_points = least_points_shown(map);
+  config.min_points = std::max(config.min_points, least_points_shown(map));
   StaticMap decided(config);
   MapSnapshot none = map.view;
   none.tiles = {};

@@ -7,6 +7,7 @@
 
 #include "core/lidar/labelled_scan.hpp"
 #include "core/localization/place_index.hpp"
+#include "core/map/static_map.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "core/session/map_alignment.hpp"
 
@@ -28,9 +29,10 @@ namespace stillmap {
 /// as another session: votes, points and counts of voxels at one place are added. Each voxel of
 /// `other` moves with the pose of its path that saw it last, to `T_map_pose`; its stamps by
 /// `clock_offset_ns`. The path is that of both. What one of the maps alone has stays: where the
-/// other saw free space is in no map. Both have voxels and tiles of the same size.
+/// other saw free space is in no map. Both have voxels and tiles of the same size. What of it is
+/// shown `config` decides: no file keeps the rule that a map was made by.
 [[nodiscard]] SavedMap merged_map(const SavedMap& map, const SavedMap& other,
                                   const std::vector<Eigen::Isometry3d>& T_map_pose,
-                                  std::int64_t clock_offset_ns);
+                                  std::int64_t clock_offset_ns, StaticMapConfig config = {});
 
 }  // namespace stillmap

@@ -77,7 +77,10 @@ TEST_F(MergeCommandTest, NamesWhatItCannotMerge) {
            std::pair{path("text.stillmap") + " " + map("a"), std::string("text.stillmap")},
            std::pair{map("a") + " " + path("empty.stillmap"), std::string("is an empty map")},
            std::pair{map("a") + " " + path("pathless.stillmap"), std::string("has no path")},
-           std::pair{map("a") + " " + path("coarse.stillmap"), std::string("voxel_size_m 0.4")},
+           std::pair{map("a") + " " + path("coarse.stillmap"), std::string("voxels of 0.4 m")},
+           std::pair{map("a") + " " + map("a"), std::string("has session 1")},
+           std::pair{map("a") + " " + map("b") + " --config " + path("text.stillmap"),
+                     std::string("text.stillmap")},
        }) {
     const ProcessResult refused = run("merge " + arguments + " --out " + path("c.stillmap"));
     EXPECT_EQ(refused.exit_code, 2) << arguments;

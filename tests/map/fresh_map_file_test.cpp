@@ -60,6 +60,24 @@ TEST_F(FreshMapFileTest, WhatLiesBesideANewFileOrACopyStays) {
                           "copy.stillmap", "copy.stillmap.new"));
 }
 
+TEST_F(FreshMapFileTest, TakesThePlaceOfWhatALinkLeadsTo) {
+  const fs::path there = folder_ / "elsewhere";
+  fs::create_directory(there);
+  open_map_file(there / "city.stillmap")->save(test::saved_map(1));
+  fs::create_symlink(there / "city.stillmap", file_);
+  const fs::path source = folder_ / "new.stillmap";
+  open_map_file(source)->save(test::saved_map(2));
+  open_map_file(source)->copy_to(file_);
+  EXPECT_TRUE(fs::is_symlink(file_));
+  test::expect_equal(open_map_file(there / "city.stillmap")->load(), test::saved_map(2));
+  const FreshMapFile fresh(file_);
+  EXPECT_EQ(fresh.path().parent_path().parent_path(), fs::canonical(there));
+  open_map_file(fresh.path())->save(test::saved_map(3));
+  replace_map_file(fresh.path(), file_);
+  EXPECT_TRUE(fs::is_symlink(file_));
+  test::expect_equal(open_map_file(there / "city.stillmap")->load(), test::saved_map(3));
+}
+
 TEST_F(FreshMapFileTest, GoesWhereItDidNotTakeThePlace) {
   {
     const FreshMapFile fresh(file_);

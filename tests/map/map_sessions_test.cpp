@@ -10,6 +10,7 @@
 
 #include "core/map/static_map.hpp"
 #include "core/map/tools/map_check.hpp"
+#include "core/map/tools/map_info.hpp"
 #include "tests/map/map_worlds.hpp"
 #include "tests/map/saved_maps.hpp"
 #include "tests/scratch_folder.hpp"
@@ -356,19 +357,51 @@ TEST_F(MapSessionsTest, DamagedRowsAreAnErrorOrNone) {
 TEST_F(MapSessionsTest, ACheckLooksAtWhatAWithdrawalWouldBringBack) {
   add_session("tuesday", 8, 10.0F);
   EXPECT_TRUE(check_map_file(file_).is_sound());
-  for (const char* column : {"encoded", "evidence"}) {
+  for (const char* fault : {"encoded = x'0102' WHERE encoded IS NOT NULL",
+                            "evidence = x'0102' WHERE evidence IS NOT NULL",
+                            "min_x = min_x + 15 WHERE encoded IS NOT NULL"}) {
     SQLite::Database database(file_.string(), SQLite::OPEN_READWRITE);
     database.exec("CREATE TABLE kept AS SELECT * FROM session_tiles");
-    database.exec(std::string("UPDATE session_tiles SET ") + column + " = x'0102' WHERE " + column +
-                  " IS NOT NULL");
+    database.exec(std::string("UPDATE session_tiles SET ") + fault);
     const MapCheck check = check_map_file(file_);
-    ASSERT_FALSE(check.faults.empty()) << column;
+    ASSERT_FALSE(check.faults.empty()) << fault;
     EXPECT_THAT(check.faults.front().what, HasSubstr("before a session"));
     database.exec("DELETE FROM session_tiles");
     database.exec("INSERT INTO session_tiles SELECT * FROM kept");
     database.exec("DROP TABLE kept");
   }
   EXPECT_TRUE(check_map_file(file_).is_sound());
+}
+
+TEST_F(MapSessionsTest, TheOnlyOneIsWithdrawnWhereTheMapHadTilesAndNoPath) {
+  SavedMap pathless = open_map_file(file_)->load();
+  pathless.trajectory = {};
+  pathless.view.map_id = 8;
+  file_ = folder_ / "pathless.stillmap";
+  open_map_file(file_)->save(pathless);
+  EXPECT_THAT([&] { withdraw_newest_session(file_, folder_ / "out.stillmap"); },
+              ThrowsMessage<MapFileError>(HasSubstr("one session alone")));
+  const std::string before = rows_of(file_);
+  add_session("tuesday", 9, 1.0F);
+  ASSERT_EQ(read_map_sessions(file_).size(), 1U);
+  withdraw_newest_session(file_, folder_ / "out.stillmap");
+  EXPECT_EQ(rows_of(folder_ / "out.stillmap"), before);
+}
+
+TEST_F(MapSessionsTest, WhatBeganAnEmptyFileIsNotWithdrawn) {
+  file_ = folder_ / "server.stillmap";
+  open_map_file(file_)->save(SavedMap{});
+  map_.reset(9);
+  run_server(9, 5, {1.0F, 5.0F});
+  ASSERT_EQ(read_map_sessions(file_).size(), 1U);
+  EXPECT_THAT([&] { withdraw_newest_session(file_, folder_ / "out.stillmap"); },
+              ThrowsMessage<MapFileError>(HasSubstr("one session alone")));
+}
+
+TEST_F(MapSessionsTest, NobodyDroveFromTheEndOfOneToTheBeginningOfTheNext) {
+  add_session("tuesday", 9, 1.0F);
+  // Poses 2 m apart, 8 steps of which one lies between the sessions.
+  EXPECT_NEAR(map_file_info(file_).map.path_length_m, 14.0, 1e-9);
 }
 
 TEST_F(MapSessionsTest, AreWithdrawnFromAFileWhateverItsName) {

@@ -29,7 +29,7 @@ class RestOfMovers : public testing::Test {
  protected:
   /// The next scan hits these voxels, and sees through those.
   void scan(const std::vector<TilePoint>& points, const std::set<int>& free_columns = {}) {
-    const std::uint32_t number = stamps_.add(movers_period_ns * ++scans_);
+    const std::uint32_t number = stamps_.add(clock_offset_ns_ + movers_period_ns * ++scans_);
     tile_->insert(points, number);
     const VisibilityTest test{
         .is_free =
@@ -67,6 +67,7 @@ class RestOfMovers : public testing::Test {
   ScanStamps stamps_;
   std::unique_ptr<LiveTile> tile_ = std::make_unique<LiveTile>(movers_tile, movers_grid);
   std::int64_t scans_ = 0;
+  std::int64_t clock_offset_ns_ = 0;
   std::uint64_t revision_ = 0;
 };
 
@@ -154,6 +155,28 @@ TEST_F(RestOfMovers, StaysHiddenWhereOneRayIsNotEnough) {
   EXPECT_TRUE(shown().empty());
   scan({mover_point(mover_key(11))});
   EXPECT_EQ(shown(), std::set{mover_key(11)});
+}
+
+TEST_F(RestOfMovers, IsNotWhatWasSeenBeforeTheClockWasSetBack) {
+  for (int k = 0; k < 10; ++k) scan({mover_point(mover_key(11)), mover_point(mover_key(30))});
+  clock_offset_ns_ = -1'000'000'000'000;
+  scan({mover_point(mover_key(10)), mover_point(mover_key(11)), mover_point(mover_key(12)),
+        mover_point(mover_key(20)), mover_point(mover_key(21))});
+  wait(10, {10, 20});
+  EXPECT_EQ(shown(), (std::set{mover_key(11), mover_key(12), mover_key(30)}))
+      << "21 is the rest of what was at 20; 11 was seen before, and 12 touches it";
+}
+
+TEST_F(RestOfMovers, IsShownOnceItIsSeenAgainInAnotherSession) {
+  scan({mover_point(mover_key(10)), mover_point(mover_key(11)), mover_point(mover_key(40))});
+  wait(10, {10});
+  ASSERT_EQ(shown(), std::set{mover_key(40)});
+  store_and_reload();
+  constexpr std::uint32_t remembered_scans = 20;
+  tile_->begin_session(remembered_scans, movers_rule);
+  EXPECT_EQ(shown(), std::set{mover_key(40)});
+  scan({mover_point(mover_key(10)), mover_point(mover_key(11))});
+  EXPECT_EQ(shown(), (std::set{mover_key(11), mover_key(40)}));
 }
 
 TEST_F(RestOfMovers, EndsAtTheTileAndAtWhatIsNotThere) {

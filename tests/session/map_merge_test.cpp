@@ -79,6 +79,46 @@ TEST(MapMerge, WhatOneOfThemAloneHasStays) {
   EXPECT_EQ(classes, (std::set{SemanticClass::building, SemanticClass::fence}));
 }
 
+TEST(MapMerge, TheRestOfAMoverInOneMapSaysNothingAgainstWhatTheOtherSaw) {
+  const auto hidden = [](SavedMap map) {
+    for (const auto& tile : map.view.tiles) {
+      auto evidence = std::make_shared<TileEvidence>();
+      evidence->id = tile->info.id;
+      evidence->hidden = tile->voxels;
+      evidence->hidden_states.assign(
+          tile->voxels.size(), {{.hits = 1, .misses = VoxelHistory::misses_of_rest}, std::nullopt});
+      map.tile_evidence[tile->info.id] = std::move(evidence);
+    }
+    map.view.tiles = {};
+    return map;
+  };
+  const SavedMap wall = wall_map(8.05, SemanticClass::building, 10);
+  const SavedMap rest = hidden(wall_map(8.05, SemanticClass::building, 10));
+  const std::vector here{Eigen::Isometry3d::Identity()};
+  EXPECT_EQ(points_of(merged_map(wall, rest, here, 0)), 2 * points_of(wall));
+  EXPECT_EQ(points_of(merged_map(rest, wall, here, 0)), 2 * points_of(wall));
+  EXPECT_EQ(points_of(merged_map(rest, rest, here, 0)), 0U);
+}
+
+TEST(MapMerge, ShowsVoxelsByTheRuleThatItIsGiven) {
+  const auto missed = [](SavedMap map) {
+    for (const auto& tile : map.view.tiles) {
+      auto evidence = std::make_shared<TileEvidence>();
+      evidence->id = tile->info.id;
+      evidence->shown.assign(tile->voxels.size(), {.hits = 1, .misses = 5, .was_shown = true});
+      map.tile_evidence[tile->info.id] = std::move(evidence);
+    }
+    return map;
+  };
+  const SavedMap map = missed(wall_map(8.05, SemanticClass::building, 10));
+  const SavedMap other = missed(wall_map(9.05, SemanticClass::building, 20));
+  const std::vector here{Eigen::Isometry3d::Identity()};
+  EXPECT_EQ(points_of(merged_map(map, other, here, 0)), 0U);
+  StaticMapConfig rule;
+  rule.misses_to_clear = 20;
+  EXPECT_EQ(points_of(merged_map(map, other, here, 0, rule)), points_of(map) + points_of(other));
+}
+
 TEST(MapMerge, APathOfTwoRunsWhoseClockBeganAnewMovesEachVoxelByItsOwnRun) {
   const SavedMap map = wall_map(8.05, SemanticClass::building, 100);
   SavedMap other = wall_map(5.05, SemanticClass::building, 4);

@@ -49,6 +49,11 @@ void check_datum(const MapExportArguments& arguments) {
 }
 
 MapQuery query_of(const MapExportArguments& arguments, const SavedMap& map) {
+  if (map.trajectory.empty() && arguments.region.around_robot_m > 0.0) {
+    throw std::invalid_argument(
+        "--around-robot: " + arguments.file +
+        " has no path that ends where the robot was: name a place by --around or --box");
+  }
   const Eigen::Vector2d robot_map =
       map.trajectory.empty()
           ? Eigen::Vector2d(Eigen::Vector2d::Zero())

@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -13,6 +15,7 @@
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
+#include "config/loaders/server_config.hpp"
 #include "core/map/map_id.hpp"
 #include "core/map/query/tile_reader.hpp"
 #include "core/map/storage/fresh_map_file.hpp"
@@ -27,15 +30,16 @@ struct MergeArguments {
   std::string map;
   std::string other;
   std::string out;
+  std::string config_file;
   bool force = false;
   bool json = false;
 };
 
-StaticMapConfig sizes_of(const SavedMap& map) {
-  StaticMapConfig config;
-  config.voxel_size_m = map.view.voxel_size_m;
-  config.tile_size_m = map.view.tile_size_m;
-  return config;
+std::string sizes_of(const SavedMap& map) {
+  std::ostringstream words;
+  words << "voxels of " << map.view.voxel_size_m << " m in tiles of " << map.view.tile_size_m
+        << " m";
+  return words.str();
 }
 
 /// Throws std::invalid_argument for a file that must not be written.
@@ -57,15 +61,58 @@ void check_out(const MergeArguments& arguments) {
   }
 }
 
+/// From a session's first pose to its last one; nothing for what has no way.
+std::optional<Eigen::Isometry3d> way_of(const MapSession& session, const SharedTrajectory& path) {
+  if (session.poses < 2) return std::nullopt;
+  const std::size_t last = session.first_pose + session.poses - 1;
+  return path[session.first_pose].T_map_lidar.inverse() * path[last].T_map_lidar;
+}
+
+/// The same drive: neither stamps nor poses of two drives are the same to the last digit.
+bool are_one(const MapSession& a, const SharedTrajectory& path_a, const MapSession& b,
+             const SharedTrajectory& path_b) {
+  const auto way_a = way_of(a, path_a), way_b = way_of(b, path_b);
+  return way_a && way_b && a.poses == b.poses &&
+         a.last_stamp_ns - a.first_stamp_ns == b.last_stamp_ns - b.first_stamp_ns &&
+         way_a->isApprox(*way_b, 1e-9);
+}
+
+/// Throws std::invalid_argument where what one map is of is in the other one: it would count twice.
+void check_apart(const EarlierMap& map, const EarlierMap& other) {
+  const auto throw_shared = [&](const std::string& what) {
+    throw std::invalid_argument(other.file().string() + " has " + what + " of " +
+                                map.file().string() +
+                                " in it, whose evidence would count twice: name maps of other "
+                                "drives, or withdraw it from one of them ('stillmap sessions')");
+  };
+  for (const MapSession& of_map : read_map_sessions(map.file())) {
+    for (const MapSession& of_other : read_map_sessions(other.file())) {
+      if (!are_one(of_map, map.saved().trajectory, of_other, other.saved().trajectory)) continue;
+      throw_shared("session " + std::to_string(of_map.number) +
+                   (of_map.source.empty() ? "" : " (" + of_map.source + ")"));
+    }
+  }
+  // Maps of before they had ids have 0.
+  const std::uint64_t id = map.saved().view.map_id;
+  if (id != 0 && id == other.saved().view.map_id) throw_shared("the map");
+}
+
 /// The other map, its sizes those of the first. Throws what EarlierMap throws.
 std::unique_ptr<const EarlierMap> other_map(const MergeArguments& arguments,
                                             const EarlierMap& map) {
-  auto other = std::make_unique<const EarlierMap>(arguments.other, sizes_of(map.saved()));
+  auto other = std::make_unique<const EarlierMap>(arguments.other, std::nullopt);
+  if (sizes_of(map.saved()) != sizes_of(other->saved())) {
+    throw std::invalid_argument(arguments.other + " has " + sizes_of(other->saved()) + ", and " +
+                                arguments.map + " has " + sizes_of(map.saved()) +
+                                ": maps of one size can be merged; map one drive anew (static_map "
+                                "of --config)");
+  }
   if (other->saved().trajectory.empty()) {
     throw std::invalid_argument(arguments.other +
                                 " has no path: what could be seen along it is what it would be "
                                 "recognised by; name it first, and the other map second");
   }
+  check_apart(map, *other);
   return other;
 }
 
@@ -98,6 +145,9 @@ ExitCode run(const MergeArguments& arguments) {
   // Until the result is written, nobody else puts a map there.
   const MapLock lock(arguments.out);
   check_out(arguments);
+  const StaticMapConfig rule = arguments.config_file.empty()
+                                   ? StaticMapConfig{}
+                                   : load_server_config(arguments.config_file).mapper.static_map;
   const auto began = std::chrono::steady_clock::now();
   const EarlierMap map(arguments.map, std::nullopt);
   const auto other = other_map(arguments, map);
@@ -111,7 +161,8 @@ ExitCode run(const MergeArguments& arguments) {
   }
   const std::int64_t clock_offset_ns = map.clock_offset_ns(
       std::ranges::min(other->saved().trajectory, {}, &StampedPose::stamp_ns).stamp_ns);
-  SavedMap merged = merged_map(map.saved(), other->saved(), alignment.T_map_lidar, clock_offset_ns);
+  SavedMap merged =
+      merged_map(map.saved(), other->saved(), alignment.T_map_lidar, clock_offset_ns, rule);
   merged.view.map_id = new_map_id();
   merged.metadata = map.saved().metadata;
   save_merged(arguments, map, merged, clock_offset_ns, alignment.closures.size());
@@ -141,6 +192,9 @@ void add_merge_command(CommandHandle program, Action& action) {
   command.option("OTHER", arguments->other, "Another map file, made apart; it needs its path")
       .required();
   command.option("--out", arguments->out, "Where the map of both is written").required();
+  command.option("--config", arguments->config_file,
+                 "Server file that the maps were made with: when a voxel is shown (static_map) is "
+                 "in no map");
   command.flag("--force", arguments->force, "Replace the file --out where it exists");
   command.flag("--json", arguments->json, "Print JSON: where the maps were joined");
   command.explain(

@@ -26,6 +26,19 @@ std::string channels_in_words(std::size_t count) {
   return words;
 }
 
+std::string votes_in_words(const ModelDescription& model) {
+  std::string words = "a point takes its pixel's class";
+  if (model.knn) {
+    words = std::to_string(model.knn->neighbours) + " nearest of " +
+            std::to_string(model.knn->window) + "x" + std::to_string(model.knn->window) + " pixels";
+  }
+  if (model.voxel_votes) {
+    words += ", then voxels of " + fixed(model.voxel_votes->edge_m, 2) + " m, " +
+             fixed(model.voxel_votes->height_m, 2) + " m high";
+  }
+  return words;
+}
+
 void print_description(const ModelDescription& model) {
   const auto line = [](const char* what, const std::string& text) {
     if (!text.empty()) std::cout << what << text << "\n";
@@ -42,6 +55,7 @@ void print_description(const ModelDescription& model) {
                          (model.follow_sensor ? ", rows as the sensor has rings" : ""));
   line("channels  ", channels_in_words(model.statistics.channels));
   line("outputs   ", std::to_string(model.classes.size()));
+  line("votes     ", votes_in_words(model));
   line("int8      ", model.int8 ? "calibrated: " + model.int8->made : "not calibrated");
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/map/storage/map_database.hpp"
+#include "core/map/storage/map_file.hpp"
 
 namespace stillmap {
 namespace {
@@ -38,12 +39,12 @@ bool is_of_fresh_file(const fs::path& folder) {
 }  // namespace
 
 FreshMapFile::FreshMapFile(const fs::path& file)
-    : folder_(beside(file, folder_suffix)), path_(folder_.path() / name_in_folder) {}
+    : folder_(beside(real_file(file), folder_suffix)), path_(folder_.path() / name_in_folder) {}
 
 void remove_left_fresh_files(const fs::path& file) {
-  const fs::path absolute = fs::absolute(file);
-  const std::string prefix = beside(absolute.filename(), folder_suffix).string();
-  for (const fs::path& entry : entries_of(absolute.parent_path())) {
+  const fs::path real = real_file(file);
+  const std::string prefix = beside(real.filename(), folder_suffix).string();
+  for (const fs::path& entry : entries_of(real.parent_path())) {
     const std::string name = entry.filename().string();
     if (name.size() != prefix.size() + letters_of_folder || !name.starts_with(prefix)) continue;
     std::error_code ignored;

@@ -193,7 +193,8 @@ class SqliteMapStore : public MapStore {
     }
   }
 
-  void copy_to(const fs::path& file) override {
+  void copy_to(const fs::path& name) override {
+    const fs::path file = real_file(name);
     // What is there must be a map, or nothing: another program's file is not overwritten.
     if (fs::exists(file)) static_cast<void>(open_map_database(file));
     try {
@@ -368,7 +369,7 @@ std::unique_ptr<MapStore> open_map_file(const fs::path& file) {
 
 void replace_map_file(const fs::path& fresh, const fs::path& file) {
   try {
-    put_in_place(fresh, file);
+    put_in_place(fresh, real_file(file));
   } catch (const fs::filesystem_error& error) {
     throw MapFileWriteError(file, std::string("cannot be replaced (") + error.what() + ")");
   }

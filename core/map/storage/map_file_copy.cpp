@@ -33,8 +33,9 @@ TemporaryFolder folder_for_copy_of(const fs::path& file) {
   try {
     return TemporaryFolder(fs::temp_directory_path() / "stillmap-read-");
   } catch (const fs::filesystem_error& error) {
-    throw MapFileError(file, std::string("cannot be copied to a temporary folder to be read (") +
-                                 error.what() + "); set TMPDIR to a folder that can be written");
+    throw MapFileWriteError(
+        file, std::string("cannot be copied to a temporary folder to be read (") + error.what() +
+                  "); set TMPDIR to a folder that can be written");
   }
 }
 
@@ -91,8 +92,8 @@ MapFileCopy::MapFileCopy(fs::path file)
   try {
     copy_with_log(real_file(file_), copy_);
   } catch (const fs::filesystem_error& error) {
-    throw MapFileError(file_, std::string("cannot be copied to be read (") + error.what() +
-                                  "); make room there, or set TMPDIR to a folder with room");
+    throw MapFileWriteError(file_, std::string("cannot be copied to be read (") + error.what() +
+                                       "); make room there, or set TMPDIR to a folder with room");
   }
 }
 

@@ -78,15 +78,33 @@ SessionEnds ends_of(SQLite::Database& database, int session) {
   return {row.getColumn(0).getInt() != 0, static_cast<std::uint64_t>(row.getColumn(1).getInt64())};
 }
 
+/// Whether there is anything in the map without the session.
+bool leaves_tiles(SQLite::Database& database, int session) {
+  SQLite::Statement kept(
+      database,
+      "SELECT EXISTS (SELECT 1 FROM session_tiles WHERE session = ?1 AND "
+      "(encoded IS NOT NULL OR evidence IS NOT NULL)) OR EXISTS (SELECT 1 FROM "
+      "tiles WHERE (x, y) NOT IN (SELECT x, y FROM session_tiles WHERE session = "
+      "?1))");
+  kept.bind(1, session);
+  return kept.executeStep() && kept.getColumn(0).getInt() != 0;
+}
+
 /// Throws MapFileError where there is none.
 MapSession withdrawable_session(SQLite::Database& database, const fs::path& file) {
   const SharedTrajectory path = read_trajectory(database);
   const std::vector<MapSession> sessions = read_sessions(database, path);
-  if (sessions.size() < 2)
+  const auto throw_alone = [&file] {
     throw MapFileError(file, "has one session alone: without it, nothing would be left of the map");
+  };
+  if (sessions.empty()) throw_alone();
   const MapSession& newest = sessions.back();
   const std::string name = "session " + std::to_string(newest.number);
-  const SessionEnds ends = ends_of(database, newest.number);
+  const SessionEnds ends =
+      database.tableExists("sessions") ? ends_of(database, newest.number) : SessionEnds{};
+  // A map may have tiles from before its first session where it had no path.
+  if (sessions.size() == 1 && !(ends.has_before && leaves_tiles(database, newest.number)))
+    throw_alone();
   if (newest.first_pose + newest.poses != path.size() ||
       ends.version_after != read_map_row(database).version)
     throw MapFileError(file, "was mapped on in since " + name +

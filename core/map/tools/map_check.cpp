@@ -261,10 +261,11 @@ void check_session_tiles(SQLite::Database& database, const MapRow& map, MapCheck
   MapCheck of_session;
   SQLite::Statement row(database,
                         "SELECT x, y, revision, content_hash, encoded, evidence, "
-                        "coalesce(voxel_count, 0) FROM session_tiles");
+                        "coalesce(voxel_count, 0), min_x, min_y, min_z, max_x, max_y, max_z FROM "
+                        "session_tiles");
   while (row.executeStep()) {
     const TileRow tile = tile_row(row);
-    if (!row.isColumnNull(4)) check_tile(tile, std::nullopt, map, of_session);
+    if (!row.isColumnNull(4)) check_tile(tile, tile_row_summary(row, 6), map, of_session);
     if (row.isColumnNull(5)) continue;
     const SQLite::Column blob = row.getColumn(5);
     check_evidence(tile.id,

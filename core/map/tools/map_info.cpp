@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/map/storage/map_file_copy.hpp"
+#include "core/map/storage/session_tables.hpp"
 
 namespace stillmap {
 namespace {
@@ -21,16 +22,24 @@ void count_voxel(const Voxel& voxel, MapInfo& info) {
       is_first ? voxel.last_seen_ns : std::max(info.observation_span.last_ns, voxel.last_seen_ns);
 }
 
+double step_m(const SharedTrajectory& path, std::size_t to) {
+  return (path[to].T_map_lidar.translation() - path[to - 1].T_map_lidar.translation()).norm();
+}
+
 void measure_path(const SharedTrajectory& trajectory, MapInfo& info) {
   info.poses = trajectory.size();
   if (trajectory.empty()) return;
   const auto [first, last] = std::ranges::minmax(trajectory, {}, &StampedPose::stamp_ns);
   info.trajectory_span = {first.stamp_ns, last.stamp_ns};
-  for (std::size_t i = 1; i < trajectory.size(); ++i) {
-    const Eigen::Vector3d step =
-        trajectory[i].T_map_lidar.translation() - trajectory[i - 1].T_map_lidar.translation();
-    info.path_length_m += step.norm();
-  }
+  for (std::size_t i = 1; i < trajectory.size(); ++i) info.path_length_m += step_m(trajectory, i);
+}
+
+/// From where one session ended to where the next one began, nobody drove.
+double way_between_sessions_m(SQLite::Database& database, const SharedTrajectory& path) {
+  double way_m = 0.0;
+  for (const MapSession& session : read_sessions(database, path))
+    if (session.poses > 0 && session.first_pose > 0) way_m += step_m(path, session.first_pose);
+  return way_m;
 }
 
 }  // namespace
@@ -53,11 +62,13 @@ MapInfo describe_map(const SavedMap& map) {
 
 MapFileInfo map_file_info(const std::filesystem::path& file) {
   const MapFileCopy copy(file);
-  MapFileInfo info{.map = describe_map(copy.load()),
+  const SavedMap map = copy.load();
+  MapFileInfo info{.map = describe_map(map),
                    .bytes = std::filesystem::file_size(copy.path()),
                    .schema_version = 0};
   SQLite::Database database(copy.path().string());
   info.schema_version = database.execAndGet("PRAGMA user_version").getUInt();
+  info.map.path_length_m -= way_between_sessions_m(database, map.trajectory);
   return info;
 }
 
