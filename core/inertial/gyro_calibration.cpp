@@ -9,8 +9,12 @@ namespace {
 
 /// Of rotations from scan to scan as registration finds them [rad].
 constexpr double registered_deviation_rad = 1e-3;
-/// Of the mean of rates at rest [rad/s].
-constexpr double rest_deviation_rad_s = 5e-4;
+/// Of the mean of rates at rest [rad/s]: registration does not show slower turns than this.
+constexpr double rest_deviation_rad_s = 1e-3;
+/// So many means at rest in a row that the bias does not explain, and that differ by no more than
+/// this from one to the next, are those of a bias that has stepped.
+constexpr int rests_after_step = 3;
+constexpr double max_rest_difference_rad_s = 3.0 * rest_deviation_rad_s;
 /// Bias and delay wander by this much in a second: variances [rad^2/s^2, s^2].
 constexpr double bias_drift = 1e-9;
 constexpr double offset_drift = 1e-9;
@@ -34,7 +38,31 @@ bool GyroCalibration::learn_from_rotation(const Eigen::Vector3d& missing_imu, do
 void GyroCalibration::learn_at_rest(const Eigen::Vector3d& mean_rate_imu) {
   Observation observation;
   observation << Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero();
-  (void)update(mean_rate_imu - bias_imu_, observation, rest_deviation_rad_s);
+  const auto learn = [&] {
+    (void)update(mean_rate_imu - bias_imu_, observation, rest_deviation_rad_s);
+  };
+  learn();
+  // Written so that NaN is not explained.
+  if ((mean_rate_imu - bias_imu_).norm() < max_rest_difference_rad_s) {
+    unexplained_rests_ = 0;
+    return;
+  }
+  const bool says_the_same =
+      unexplained_rests_ > 0 &&
+      (mean_rate_imu - unexplained_rate_imu_).norm() < max_rest_difference_rad_s;
+  unexplained_rests_ = says_the_same ? unexplained_rests_ + 1 : 1;
+  unexplained_rate_imu_ = mean_rate_imu;
+  const bool may_be_bias = (mean_rate_imu.array().abs() < max_bias_rad_s).all();
+  if (unexplained_rests_ < rests_after_step || !may_be_bias) return;
+  forget_bias();
+  learn();
+  unexplained_rests_ = 0;
+}
+
+void GyroCalibration::forget_bias() {
+  covariance_.topRows<3>().setZero();
+  covariance_.leftCols<3>().setZero();
+  covariance_.diagonal().head<3>().setConstant(max_bias_rad_s * max_bias_rad_s);
 }
 
 bool GyroCalibration::update(const Eigen::Vector3d& missing, const Observation& observation,

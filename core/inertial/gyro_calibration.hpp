@@ -21,7 +21,8 @@ class GyroCalibration {
   bool learn_from_rotation(const Eigen::Vector3d& missing_imu, double duration_s,
                            const Eigen::Vector3d& rate_change_imu);
 
-  /// The gyro measured this while it did not turn.
+  /// The gyro measured this while it did not turn. What the bias so far does not explain is learnt
+  /// once several times in a row say the same: the bias has stepped.
   void learn_at_rest(const Eigen::Vector3d& mean_rate_imu);
 
  private:
@@ -31,11 +32,16 @@ class GyroCalibration {
 
   /// `observation` times the state's error explains `missing`, but for noise of `deviation`.
   bool update(const Eigen::Vector3d& missing, const Observation& observation, double deviation);
+  /// The bias may be any, again.
+  void forget_bias();
 
   Eigen::Vector3d bias_imu_ = Eigen::Vector3d::Zero();
   double time_offset_s_;
   /// 1 degree a second and 20 ms.
   Covariance covariance_ = State(3e-4, 3e-4, 3e-4, 4e-4).asDiagonal();
+  /// At rest, since one was explained: the last mean rate that was not, and how many say the same.
+  Eigen::Vector3d unexplained_rate_imu_ = Eigen::Vector3d::Zero();
+  int unexplained_rests_ = 0;
 };
 
 }  // namespace stillmap

@@ -10,12 +10,13 @@ constexpr double sweep_step_s = 0.0025;
 constexpr int max_sweep_steps = 400;
 /// Up is the mean over this time.
 constexpr std::int64_t up_window_ns = 500'000'000;
-/// The lidar rests when it turns by less than this from pose to pose, and the
-/// rate is a bias when it is the mean over at least this time [rad, s].
+/// The lidar rests when it turns by less than this within at least this time [rad, s]: its rate is
+/// then the gyro's bias. In a shorter time a slow turn could not be told from what registration
+/// errs by, and would be learnt as a bias.
 constexpr double max_rest_rotation_rad = 0.0015;
-constexpr double min_rest_s = 0.08;
+constexpr double min_rest_s = 1.0;
 /// What is not steady for so long is no rest.
-constexpr double max_rest_s = 0.25;
+constexpr double max_rest_s = 1.3;
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 std::int64_t nanoseconds(double s) { return std::llround(s * 1e9); }

@@ -42,5 +42,30 @@ TEST(GyroCalibration, LearnsNothingFromWhatNoBiasExplains) {
   EXPECT_EQ(calibration.bias_imu(), Eigen::Vector3d(0.0, 0.0, 0.0));
 }
 
+TEST(GyroCalibration, FollowsABiasThatStepsAtRest) {
+  for (const double step : {0.005, 0.03, 0.12}) {
+    GyroCalibration calibration(0.0);
+    const Eigen::Vector3d before(0.008, 0.002, -0.005);
+    for (int k = 0; k < 60; ++k) calibration.learn_at_rest(before);
+    const Eigen::Vector3d after = before + Eigen::Vector3d(0.0, step, 0.0);
+    for (int k = 0; k < 5; ++k) calibration.learn_at_rest(after);
+    EXPECT_LT((calibration.bias_imu() - after).norm(), 1e-3) << step;
+  }
+}
+
+TEST(GyroCalibration, TakesRatesThatDifferForNoBias) {
+  GyroCalibration calibration(0.0);
+  const Eigen::Vector3d bias(0.008, 0.002, -0.005);
+  for (int k = 0; k < 60; ++k) calibration.learn_at_rest(bias);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (int k = 0; k < 20; ++k) {
+    calibration.learn_at_rest(bias + Eigen::Vector3d(0.01 * (k % 7 + 1), 0.0, 0.0));
+    calibration.learn_at_rest({nan, nan, nan});
+    calibration.learn_at_rest({0.0, 0.0, 5.0});
+  }
+  for (int k = 0; k < 20; ++k) calibration.learn_at_rest({0.0, 0.0, 5.0});
+  EXPECT_LT((calibration.bias_imu() - bias).norm(), 1e-6);
+}
+
 }  // namespace
 }  // namespace stillmap

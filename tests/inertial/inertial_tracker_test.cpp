@@ -139,5 +139,26 @@ TEST(InertialTracker, TellsUpAtRestAlongTheLidarsAxes) {
   EXPECT_FALSE(unknown_mount.up_lidar(900 * per_ms));
 }
 
+TEST(InertialTracker, TakesASlowTurnForNoBias) {
+  // A curve that turns by less from scan to scan than registration can tell from rest.
+  constexpr double turn_rad_s = 0.012;
+  InertialTracker tracker(ImuMount{});
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0.0, 0.001);
+  std::int64_t sampled_ms = 0;
+  double worst_rad_s = 0.0;
+  for (std::int64_t now_ms = 100; now_ms <= 10'000; now_ms += 100) {
+    for (; sampled_ms <= now_ms + 50; sampled_ms += 5) {
+      tracker.add({sampled_ms * per_ms,
+                   {noise(random), noise(random), turn_rad_s + noise(random)},
+                   {noise(random), noise(random), 9.81}});
+    }
+    tracker.learn((now_ms - 100) * per_ms, now_ms * per_ms,
+                  rotation_by({0.0, 0.0, 0.1 * turn_rad_s}).toRotationMatrix());
+    worst_rad_s = std::max(worst_rad_s, tracker.calibration().bias_imu().norm());
+  }
+  EXPECT_LT(worst_rad_s, 0.002);
+}
+
 }  // namespace
 }  // namespace stillmap
