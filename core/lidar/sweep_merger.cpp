@@ -120,10 +120,18 @@ Scan merged_scan(std::vector<Scan> parts) {
 }
 
 SweepMerger::SweepMerger(const Config& config)
-    : config_(config), lidars_(config.lidars), is_silent_(config.lidars, false) {}
+    : config_(config),
+      lidars_(config.lidars),
+      is_silent_(config.lidars, false),
+      rhythms_(config.lidars) {}
 
 std::size_t SweepMerger::add(std::size_t lidar, Scan scan, double now_s) {
   is_silent_[lidar] = false;
+  Rhythm& rhythm = rhythms_[lidar];
+  rhythm = {.newest_ns = scan.stamp_ns,
+            .step_ns = rhythm.newest_ns ? scan.stamp_ns - *rhythm.newest_ns : 0,
+            .step_before_ns = rhythm.step_ns,
+            .arrived_s = now_s};
   const bool is_late = last_stamp_ns_ && scan.stamp_ns <= *last_stamp_ns_ &&
                        seconds(*last_stamp_ns_ - scan.stamp_ns) < max_late_s;
   if (is_late) return 1;
@@ -149,25 +157,47 @@ bool SweepMerger::is_in_sweep(std::size_t lidar, std::int64_t stamp_ns) const {
   return seconds(lidars_[lidar].front().scan.stamp_ns - stamp_ns) < 0.5 * config_.period_s;
 }
 
+bool SweepMerger::is_due(const Rhythm& rhythm, std::int64_t stamp_ns) const {
+  if (!rhythm.newest_ns) return true;
+  const std::int64_t step_ns = std::min(rhythm.step_ns, rhythm.step_before_ns);
+  // Nothing that goes on so slowly is a rhythm.
+  if (step_ns <= 0 || seconds(step_ns) > 2.5 * config_.period_s) return true;
+  const double ahead_s = seconds(*rhythm.newest_ns + step_ns - stamp_ns);
+  return ahead_s < 0.5 * config_.period_s || ahead_s > max_late_s;
+}
+
+bool SweepMerger::may_come(std::size_t lidar, std::int64_t stamp_ns) const {
+  return lidars_[lidar].empty() && !is_silent_[lidar] && is_due(rhythms_[lidar], stamp_ns);
+}
+
+bool SweepMerger::waits_for(std::size_t lidar, const Waiting& reference, double now_s) const {
+  const std::int64_t stamp_ns = reference.scan.stamp_ns;
+  if (!may_come(lidar, stamp_ns)) return false;
+  if (now_s - reference.arrived_s < config_.max_wait_s) return true;
+  const bool is_far_ahead = last_stamp_ns_ && seconds(stamp_ns - *last_stamp_ns_) > max_late_s;
+  const Rhythm& rhythm = rhythms_[lidar];
+  return is_far_ahead && rhythm.newest_ns && now_s - rhythm.arrived_s < max_pause_s;
+}
+
 std::optional<SweepMerger::Sweep> SweepMerger::next(double now_s) {
   const auto first = earliest();
   if (!first) return std::nullopt;
   const Waiting& reference = lidars_[*first].front();
   const std::int64_t stamp_ns = reference.scan.stamp_ns;
-  const bool is_overdue = now_s - reference.arrived_s >= config_.max_wait_s;
+  for (std::size_t lidar = 0; lidar < lidars_.size(); ++lidar)
+    if (waits_for(lidar, reference, now_s)) return std::nullopt;
   std::vector<Scan> parts;
   Sweep sweep;
   for (std::size_t lidar = 0; lidar < lidars_.size(); ++lidar) {
-    if (is_in_sweep(lidar, stamp_ns)) continue;
-    const bool may_come = lidars_[lidar].empty() && !is_silent_[lidar];
-    if (may_come && !is_overdue) return std::nullopt;
-    if (may_come) is_silent_[lidar] = true;
-    sweep.missing.push_back(lidar);
-  }
-  for (std::size_t lidar = 0; lidar < lidars_.size(); ++lidar) {
-    if (!is_in_sweep(lidar, stamp_ns)) continue;
-    parts.push_back(std::move(lidars_[lidar].front().scan));
-    lidars_[lidar].pop_front();
+    if (is_in_sweep(lidar, stamp_ns)) {
+      parts.push_back(std::move(lidars_[lidar].front().scan));
+      lidars_[lidar].pop_front();
+      continue;
+    }
+    const bool came_not = may_come(lidar, stamp_ns);
+    const bool is_missing = came_not || is_silent_[lidar] || !lidars_[lidar].empty();
+    if (came_not) is_silent_[lidar] = true;
+    if (is_missing) sweep.missing.push_back(lidar);
   }
   last_stamp_ns_ = stamp_ns;
   sweep.scan = merged_scan(std::move(parts));

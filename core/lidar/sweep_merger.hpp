@@ -48,7 +48,7 @@ class SweepMerger {
 
   struct Sweep {
     Scan scan;
-    /// Lidars that sent nothing in time.
+    /// Lidars that sent nothing in time, but for those that were not due.
     std::vector<std::size_t> missing;
   };
 
@@ -59,7 +59,9 @@ class SweepMerger {
   [[nodiscard]] std::size_t add(std::size_t lidar, Scan scan, double now_s);
 
   /// The next sweep that has all its scans or need not wait any longer. A lidar that kept a sweep
-  /// waiting in vain is not waited for until it sends again.
+  /// waiting in vain is not waited for until it sends again; a slower one is waited for only where
+  /// its next scan is due. A sweep far ahead of the last one waits while a lidar that it lacks goes
+  /// on sending: one of the clocks is wrong, and sweeps by both in turn could not be mapped.
   [[nodiscard]] std::optional<Sweep> next(double now_s);
 
   /// Scans of a lidar that wait for those of others.
@@ -68,11 +70,23 @@ class SweepMerger {
  private:
   /// More wait only where the clocks of lidars differ by as many sweeps.
   static constexpr std::size_t max_waiting = 8;
-  /// A scan that is older than this comes of a clock that was set back, not too late.
+  /// A scan that is older than this comes of a clock that was set back, not too late; one that is
+  /// farther ahead, of a clock that was set forward.
   static constexpr double max_late_s = 1.0;
+  /// A lidar that sent within this time by arrival goes on sending.
+  static constexpr double max_pause_s = 1.0;
 
   struct Waiting {
     Scan scan;
+    double arrived_s = 0.0;
+  };
+
+  /// When a lidar sent, by its stamps and by arrival.
+  struct Rhythm {
+    std::optional<std::int64_t> newest_ns{};
+    /// The last two times from stamp to stamp; 0: not known.
+    std::int64_t step_ns = 0;
+    std::int64_t step_before_ns = 0;
     double arrived_s = 0.0;
   };
 
@@ -80,11 +94,18 @@ class SweepMerger {
   [[nodiscard]] std::optional<std::size_t> earliest() const;
   /// Whether the lidar's waiting scan is of the sweep that begins at this stamp.
   [[nodiscard]] bool is_in_sweep(std::size_t lidar, std::int64_t stamp_ns) const;
+  /// Whether a scan that it does not have yet may come for the sweep that begins at this stamp.
+  [[nodiscard]] bool may_come(std::size_t lidar, std::int64_t stamp_ns) const;
+  /// By its rhythm so far, which one lost scan does not change.
+  [[nodiscard]] bool is_due(const Rhythm& rhythm, std::int64_t stamp_ns) const;
+  /// Whether that sweep waits for a scan that may come.
+  [[nodiscard]] bool waits_for(std::size_t lidar, const Waiting& reference, double now_s) const;
 
   Config config_;
   /// In the order of arrival.
   std::vector<std::deque<Waiting>> lidars_;
   std::vector<bool> is_silent_;
+  std::vector<Rhythm> rhythms_;
   std::optional<std::int64_t> last_stamp_ns_;
 };
 

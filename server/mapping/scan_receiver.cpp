@@ -21,8 +21,16 @@ constexpr std::size_t max_ahead = 3;
 // and a sweep waits at least so long for a scan: no time of the sensor's passes between scans.
 constexpr double min_lossless_wait_s = 5.0;
 
+// Of lidars of different rates: a scan of the slowest comes so much later than one of the fastest
+// that began with it.
+double difference_of_periods_s(const ServerConfig& config) {
+  const auto period_s = [](const LidarConfig& lidar) { return lidar.sensor.period_s; };
+  const auto [fastest, slowest] = std::ranges::minmax_element(config.lidars, {}, period_s);
+  return fastest == config.lidars.end() ? 0.0 : period_s(*slowest) - period_s(*fastest);
+}
+
 SweepMerger::Config merging_of(const ServerConfig& config) {
-  const double wait_s = config.input.sweep_wait_s;
+  const double wait_s = config.input.sweep_wait_s + difference_of_periods_s(config);
   const bool every = config.input.delivery == DeliveryMode::every;
   return {.lidars = config.lidars.size(),
           .period_s = config.mapper.sensor.period_s,

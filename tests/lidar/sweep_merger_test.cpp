@@ -164,18 +164,79 @@ TEST_F(Merger, TakesAClockThatWasSetBack) {
   EXPECT_TRUE(merger_.next(0.2));
 }
 
-TEST_F(Merger, IsBoundedWhereClocksDiffer) {
+TEST_F(Merger, GoesOnByOneClockWhereClocksDiffer) {
   std::size_t lost = 0;
+  const auto take_all = [&](double now_s) {
+    while (const auto sweep = merger_.next(now_s)) {
+      EXPECT_THAT(xs(sweep->scan), ElementsAre(1.0F)) << now_s;
+      EXPECT_THAT(sweep->missing, ElementsAre(1U)) << now_s;
+    }
+  };
   for (int i = 0; i < 100; ++i) {
     const double now_s = 0.1 * i;
     lost += merger_.add(0, scan_at(1000 + 100 * i, 1.0F), now_s);
-    lost += merger_.add(1, scan_at(9'000'000 + 100 * i, 2.0F), now_s);
-    const auto sweep = merger_.next(now_s);
-    ASSERT_TRUE(sweep) << i;
-    EXPECT_THAT(xs(sweep->scan), ElementsAre(1.0F)) << i;
+    if (i > 0) take_all(now_s);
+    lost += merger_.add(1, scan_at(38'000 + 100 * i, 2.0F), now_s + 0.03);
+    take_all(now_s + 0.03);
+    take_all(now_s + 0.09);
   }
   EXPECT_LE(merger_.waiting(1), 8U);
   EXPECT_EQ(lost, 92U);
+}
+
+TEST_F(Merger, GoesOnWhereAllClocksAreSetForward) {
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_EQ(merger_.add(0, scan_at(1000 + 100 * i, 1.0F), 0.1 * i), 0U);
+    EXPECT_EQ(merger_.add(1, scan_at(1000 + 100 * i, 2.0F), 0.1 * i), 0U);
+    ASSERT_TRUE(merger_.next(0.1 * i));
+  }
+  EXPECT_EQ(merger_.add(0, scan_at(38'500, 1.0F), 0.5), 0U);
+  EXPECT_EQ(merger_.add(1, scan_at(38'500, 2.0F), 0.52), 0U);
+  EXPECT_THAT(merger_.next(0.52)->missing, IsEmpty());
+  // Once more, and one falls silent with that.
+  EXPECT_EQ(merger_.add(0, scan_at(80'000, 1.0F), 0.6), 0U);
+  EXPECT_FALSE(merger_.next(0.7));
+  EXPECT_THAT(merger_.next(1.6)->missing, ElementsAre(1U));
+}
+
+/// Of scans that a lidar sends from `begin_ms` on, when they end, for 20 s.
+struct Sender {
+  std::int64_t period_ms;
+  std::int64_t begin_ms;
+};
+
+/// Scans of each of two lidars that go into sweeps.
+std::vector<std::size_t> merged_of(SweepMerger merger, const std::vector<Sender>& senders) {
+  std::vector<std::size_t> merged(senders.size(), 0);
+  for (std::int64_t now_ms = 0; now_ms < 20'000; ++now_ms) {
+    const double now_s = 0.001 * static_cast<double>(now_ms);
+    for (std::size_t lidar = 0; lidar < senders.size(); ++lidar) {
+      const std::int64_t begun_ms = now_ms - senders[lidar].period_ms - senders[lidar].begin_ms;
+      if (begun_ms < 0 || begun_ms % senders[lidar].period_ms != 0) continue;
+      const std::int64_t stamp_ms = 1000 + now_ms - senders[lidar].period_ms;
+      (void)merger.add(lidar, scan_at(stamp_ms, static_cast<float>(lidar)), now_s);
+    }
+    while (const auto sweep = merger.next(now_s)) {
+      // Rates have to show first.
+      const bool is_known = now_ms > 1000;
+      EXPECT_TRUE(!is_known || sweep->missing.empty()) << now_ms << " ms";
+      for (const float x : xs(sweep->scan)) merged[static_cast<std::size_t>(x)] += 1;
+    }
+  }
+  return merged;
+}
+
+TEST(MergerOfDifferentRates, LosesNoScans) {
+  const SweepMerger merger({.lidars = 2, .period_s = 0.1, .max_wait_s = 0.1});
+  for (const std::int64_t later_ms : {0, 10, 25}) {
+    const auto merged = merged_of(merger, {{100, 0}, {50, later_ms}});
+    EXPECT_GE(merged[0], 196U) << later_ms;
+    EXPECT_GE(merged[1], 395U) << later_ms;
+  }
+  const SweepMerger rare_merger({.lidars = 2, .period_s = 0.2, .max_wait_s = 0.2});
+  const auto merged = merged_of(rare_merger, {{100, 0}, {200, 10}});
+  EXPECT_GE(merged[0], 195U);
+  EXPECT_GE(merged[1], 97U);
 }
 
 }  // namespace
