@@ -27,30 +27,43 @@ void ImuQueue::push(const ImuSample& sample) {
       samples_.erase(samples_.begin(), samples_.begin() + max_waiting / 2);
     samples_.push_back(sample);
     newest_ns_ = sample.stamp_ns;
+    const bool was_worth_waiting = missed_ && reaches(missed_->until_ns) &&
+                                   std::chrono::steady_clock::now() <= missed_->deadline;
+    if (was_worth_waiting) vain_waits_ = 0;
   }
   pushed_.notify_all();
 }
 
 std::vector<ImuSample> ImuQueue::take(std::int64_t until_ns, std::chrono::milliseconds patience) {
   std::unique_lock lock(mutex_);
+  missed_.reset();
   if (reaches(until_ns)) {
     vain_waits_ = 0;
-  } else if (vain_waits_ < max_vain_waits) {
-    const bool came = pushed_.wait_for(lock, patience, [&] { return reaches(until_ns); });
-    vain_waits_ = came ? 0 : vain_waits_ + 1;
+  } else if (patience > std::chrono::milliseconds(0)) {
+    if (vain_waits_ < max_vain_waits) {
+      const bool came = pushed_.wait_for(lock, patience, [&] { return reaches(until_ns); });
+      vain_waits_ = came ? 0 : vain_waits_ + 1;
+    } else {
+      missed_ = Missed{until_ns, std::chrono::steady_clock::now() + patience};
+    }
   }
   return std::exchange(samples_, {});
 }
 
 ImuReceiver::ImuReceiver(dds::Participant& participant, const std::string& ros_topic,
-                         DeliveryMode delivery)
+                         DeliveryMode delivery, Statistics& statistics)
     : patience_(patience_of(delivery)),
       reader_(participant, dds::imu_topic(ros_topic, delivery).dds_name,
               dds::imu_topic(ros_topic, delivery).reader),
       worker_("imu", std::chrono::seconds(0),
-              [this, message = sensor_msgs::msg::Imu()](const std::stop_token& stop) mutable {
+              [this, &statistics,
+               message = sensor_msgs::msg::Imu()](const std::stop_token& stop) mutable {
                 if (!reader_.take(message, stop, std::chrono::seconds(1))) return;
-                if (const auto sample = wire::from_imu(message)) queue_.push(*sample);
+                if (const auto sample = wire::from_imu(message)) {
+                  queue_.push(*sample);
+                } else {
+                  statistics.count("imu_not_usable");
+                }
               }) {}
 
 std::vector<ImuSample> ImuReceiver::take(std::int64_t until_ns) {

@@ -12,6 +12,7 @@
 #include "idl/dds/reader.hpp"
 #include "idl/interface/server_status.hpp"
 #include "sensor_msgs.h"
+#include "server/monitoring/statistics.hpp"
 #include "server/threads/periodic_worker.hpp"
 
 namespace stillmap::server {
@@ -24,7 +25,7 @@ class ImuQueue {
 
   /// All samples since the last call. Waits up to `patience` for the one at or after `until_ns`, as
   /// a scan often comes before the last samples of its sweep; but not after many waits in vain,
-  /// until a sample reaches as far by itself.
+  /// until the sample comes within the patience of a call that did not wait for it.
   [[nodiscard]] std::vector<ImuSample> take(std::int64_t until_ns,
                                             std::chrono::milliseconds patience);
 
@@ -37,12 +38,19 @@ class ImuQueue {
   std::optional<std::int64_t> newest_ns_;
   /// Waits in a row that ended without the sample.
   int vain_waits_ = 0;
+  /// The sample that the last call did without, and until when it would have waited for it.
+  struct Missed {
+    std::int64_t until_ns = 0;
+    std::chrono::steady_clock::time_point deadline;
+  };
+  std::optional<Missed> missed_;
 };
 
 /// Receives sensor_msgs/Imu.
 class ImuReceiver {
  public:
-  ImuReceiver(dds::Participant& participant, const std::string& ros_topic, DeliveryMode delivery);
+  ImuReceiver(dds::Participant& participant, const std::string& ros_topic, DeliveryMode delivery,
+              Statistics& statistics);
 
   /// As ImuQueue::take. Does not wait where nobody publishes.
   [[nodiscard]] std::vector<ImuSample> take(std::int64_t until_ns);

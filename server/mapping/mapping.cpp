@@ -53,7 +53,7 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
     static_transforms_.emplace(context.participant, context.topics, context.statistics);
   }
   if (!config.topics.imu.empty())
-    imu_.emplace(context.participant, config.topics.imu, config.input.delivery);
+    imu_.emplace(context.participant, config.topics.imu, config.input.delivery, context.statistics);
   if (!config.topics.initial_pose.empty()) {
     initial_pose_.emplace(context.participant, config.topics.initial_pose, config.frames.map,
                           place_finder_, context.statistics);

@@ -50,5 +50,43 @@ TEST(ImuQueue, KeepsTheNewestWhenNobodyTakes) {
   EXPECT_EQ(samples.back().stamp_ns, 19'999 * 1'000'000LL);
 }
 
+TEST(ImuQueue, WaitsForAnImuThatBeginsAfterTheLidar) {
+  ImuQueue queue;
+  // Nobody publishes yet: these do not wait.
+  for (int k = 0; k < 100; ++k) EXPECT_TRUE(queue.take(k * 1'000'000LL, 0ms).empty());
+  std::jthread late([&] {
+    std::this_thread::sleep_for(20ms);
+    queue.push(sample_at_ms(1100));
+  });
+  EXPECT_EQ(queue.take(1100 * 1'000'000LL, test::patience).size(), 1U);
+}
+
+TEST(ImuQueue, WaitsAgainAfterAnOutage) {
+  ImuQueue queue;
+  for (int k = 0; k < 10; ++k) (void)queue.take(1000 * 1'000'000LL, 1ms);
+  // Samples are back, each a little after the scan that asks for it.
+  EXPECT_TRUE(queue.take(2000 * 1'000'000LL, test::patience).empty());
+  queue.push(sample_at_ms(2000));
+  std::jthread late([&] {
+    std::this_thread::sleep_for(20ms);
+    queue.push(sample_at_ms(2100));
+  });
+  EXPECT_EQ(queue.take(2100 * 1'000'000LL, test::patience).size(), 2U);
+}
+
+TEST(ImuQueue, GivesUpASampleThatComesTooLate) {
+  ImuQueue queue;
+  for (int k = 0; k < 10; ++k) (void)queue.take(1000 * 1'000'000LL, 1ms);
+  const auto began = std::chrono::steady_clock::now();
+  for (std::int64_t k = 0; k < 20; ++k) {
+    (void)queue.take((2000 + k) * 1'000'000LL, 1ms);
+    std::this_thread::sleep_for(3ms);
+    queue.push(sample_at_ms(2000 + k));
+  }
+  // A wait of 10 s would have begun.
+  (void)queue.take(3000 * 1'000'000LL, 10s);
+  EXPECT_LT(std::chrono::steady_clock::now() - began, 8s);
+}
+
 }  // namespace
 }  // namespace stillmap::server
