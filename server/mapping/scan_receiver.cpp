@@ -37,12 +37,20 @@ SweepMerger::Config merging_of(const ServerConfig& config) {
           .max_wait_s = every ? std::max(wait_s, min_lossless_wait_s) : wait_s};
 }
 
-// What is too near or too far for the lidar itself.
-PrepareConfig range_of(const PrepareConfig& prepare) {
-  return {.min_range_m = prepare.min_range_m,
-          .max_range_m = prepare.max_range_m,
-          .ego_hull_lidar = {},
-          .deskew = false};
+// What is too near or too far for each lidar itself.
+std::vector<PrepareConfig> ranges_of(const ServerConfig& config) {
+  const PrepareConfig& prepare = config.mapper.prepare;
+  const AutomaticSensor& left_open = config.automatic_sensor;
+  std::vector<PrepareConfig> ranges;
+  for (const LidarConfig& lidar : config.lidars) {
+    const SensorModel& sensor = lidar.sensor;
+    ranges.push_back(
+        {.min_range_m = left_open.sets_min_range ? sensor.min_range_m : prepare.min_range_m,
+         .max_range_m = left_open.sets_max_range ? sensor.max_range_m : prepare.max_range_m,
+         .ego_hull_lidar = {},
+         .deskew = false});
+  }
+  return ranges;
 }
 
 std::vector<Eigen::Isometry3d> places_of(const ServerConfig& config) {
@@ -89,7 +97,7 @@ double seconds_since(const builtin_interfaces::msg::Time& stamp) {
 
 SweepInput::SweepInput(const ServerConfig& config, ScanQueue& queue, Statistics& statistics)
     : lidars_(config.lidars),
-      usable_(range_of(config.mapper.prepare)),
+      usable_(ranges_of(config)),
       T_merged_lidars_(places_of(config)),
       frame_(config.frames.lidar),
       delivery_(config.input.delivery),
@@ -102,7 +110,7 @@ double SweepInput::now_s() const {
 }
 
 void SweepInput::add(std::size_t lidar, Scan scan, const std::stop_token& stop) {
-  scan = drop_unusable_points(std::move(scan), usable_);
+  scan = drop_unusable_points(std::move(scan), usable_[lidar]);
   turn_up(scan, lidars_[lidar].sensor.elevation_offset);
   move_points(scan, T_merged_lidars_[lidar]);
   std::unique_lock lock(mutex_);

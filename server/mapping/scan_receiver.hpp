@@ -49,7 +49,8 @@ class SweepInput {
   void drop(const std::string& reason, std::size_t count, const std::string& detail);
 
   std::vector<LidarConfig> lidars_;
-  PrepareConfig usable_;
+  /// Of each lidar.
+  std::vector<PrepareConfig> usable_;
   std::vector<Eigen::Isometry3d> T_merged_lidars_;
   std::string frame_;
   DeliveryMode delivery_;
