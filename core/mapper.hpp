@@ -54,6 +54,14 @@ struct ScanRejection {
   std::string reason;
 };
 
+/// What an IMU did to level the start of a map.
+struct Levelling {
+  /// The lidar leans by so much [rad].
+  double tilt_rad = 0.0;
+  /// Why the map is not levelled; empty where it is.
+  std::string fault{};
+};
+
 /// Decides whether a scan's stamp can be believed. A stamp far in the future, or before the last
 /// one, is a fault until the scans after it go on from there: then the clock was set.
 class ScanClock {
@@ -128,6 +136,8 @@ class Mapper {
   /// they are wrong, scans are mapped by what the scans themselves say.
   void add(const ImuSample& sample) { inertial_.add(sample); }
   [[nodiscard]] const InertialTracker& inertial() const { return inertial_; }
+  /// How the IMU levelled the start of the map; nothing where it was not asked.
+  [[nodiscard]] const std::optional<Levelling>& levelling() const { return levelling_; }
 
   [[nodiscard]] const ScanRejection& last_rejection() const { return last_rejection_; }
   /// The poses of all scans, or of the last ones.
@@ -210,7 +220,7 @@ class Mapper {
   /// The prior, or for the first scan of a new map the attitude that the IMU tells: map's z is up.
   [[nodiscard]] std::optional<Eigen::Isometry3d> levelled(
       const std::optional<Eigen::Isometry3d>& T_map_lidar_prior, std::int64_t stamp_ns,
-      const SweepTimes& sweep) const;
+      const SweepTimes& sweep);
   [[nodiscard]] std::optional<Eigen::Isometry3d> in_odometry_frame(
       const std::optional<Eigen::Isometry3d>& T_map_lidar) const;
   /// What odometry says in its own frame, in the map.
@@ -230,6 +240,7 @@ class Mapper {
   MapperListeners listeners_;
   LabelSynchronizer label_synchronizer_;
   InertialTracker inertial_;
+  std::optional<Levelling> levelling_;
   /// Of the last scan that was registered, in the middle of its sweep; in the odometry's frame.
   std::optional<StampedPose> last_middle_;
   Odometry odometry_;

@@ -23,7 +23,7 @@ constexpr double max_steady_rate_deviation = 0.01;
 constexpr double max_steady_acceleration_share = 0.01;
 /// And turns slower than this [rad/s].
 constexpr double max_steady_rate = 0.1;
-constexpr std::ptrdiff_t min_steady_samples = 10;
+constexpr std::ptrdiff_t min_steady_samples = 5;
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
@@ -118,6 +118,10 @@ std::optional<SteadyMean> ImuTrack::steady_mean(std::int64_t from_ns, std::int64
   const auto last = std::ranges::upper_bound(entries_, to_ns, {}, stamp);
   const std::ptrdiff_t count = last - first;
   if (count < min_steady_samples) return std::nullopt;
+  const auto is_frozen = [count](const Entry& entry) {
+    return entry.repetitions >= std::min<std::ptrdiff_t>(max_repetitions, count - 1);
+  };
+  if (std::any_of(first, last, is_frozen)) return std::nullopt;
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
   for (auto entry = first; entry != last; ++entry) {
@@ -137,6 +141,7 @@ std::optional<SteadyMean> ImuTrack::steady_mean(std::int64_t from_ns, std::int64
   if (!is_steady) return std::nullopt;
   return SteadyMean{.angular_velocity_imu = rate,
                     .up_imu = acceleration.normalized(),
+                    .acceleration_m_s2 = acceleration.norm(),
                     .duration_s = seconds(stamp(*std::prev(last)) - stamp(*first))};
 }
 

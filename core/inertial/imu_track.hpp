@@ -23,6 +23,9 @@ struct SteadyMean {
   Eigen::Vector3d angular_velocity_imu = Eigen::Vector3d::Zero();
   /// Unit vector against gravity.
   Eigen::Vector3d up_imu = Eigen::Vector3d::UnitZ();
+  /// Of the mean specific force [m/s^2].
+  double acceleration_m_s2 = 0.0;
+  /// From its first sample to its last.
   double duration_s = 0.0;
 };
 
@@ -43,7 +46,13 @@ class ImuTrack {
   /// Rate of turn [rad/s]; nothing where samples are missing.
   [[nodiscard]] std::optional<Eigen::Vector3d> rate_at(std::int64_t time_ns) const;
 
-  /// Nothing where the IMU was shaken or turned between these times, or has too few samples.
+  /// The stamp of the last sample.
+  [[nodiscard]] std::optional<std::int64_t> newest_ns() const {
+    return entries_.empty() ? std::nullopt : std::optional(entries_.back().sample.stamp_ns);
+  }
+
+  /// Nothing where the IMU was shaken or turned between these times, has too few samples, or says
+  /// the same again and again.
   [[nodiscard]] std::optional<SteadyMean> steady_mean(std::int64_t from_ns,
                                                       std::int64_t to_ns) const;
 

@@ -1,6 +1,8 @@
 #include "core/inertial/inertial_tracker.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <sstream>
 
 namespace stillmap {
 namespace {
@@ -10,6 +12,15 @@ constexpr double sweep_step_s = 0.0025;
 constexpr int max_sweep_steps = 400;
 /// Up is the mean over this time.
 constexpr std::int64_t up_window_ns = 500'000'000;
+/// And over this time at least: in a shorter one, to brake looks like a tilt [s].
+constexpr double min_up_s = 0.2;
+/// Where there is less, so much after it counts, too.
+constexpr std::int64_t up_window_after_ns = 300'000'000;
+/// Gravity is measured within this share of it, in m/s^2 or, as Livox's drivers have it, in g.
+constexpr double gravity_m_s2 = 9.81;
+constexpr double max_gravity_share = 0.15;
+/// A smaller rotation from pose to pose is not told from what registration errs by [rad].
+constexpr double min_turn_rad = 0.01;
 /// The lidar rests when it turns by less than this within at least this time [rad, s]: its rate is
 /// then the gyro's bias. In a shorter time a slow turn could not be told from what registration
 /// errs by, and would be learnt as a bias.
@@ -20,6 +31,11 @@ constexpr double max_rest_s = 1.3;
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 std::int64_t nanoseconds(double s) { return std::llround(s * 1e9); }
+
+bool is_gravity(double acceleration) {
+  return std::abs(acceleration / gravity_m_s2 - 1.0) <= max_gravity_share ||
+         std::abs(acceleration - 1.0) <= max_gravity_share;
+}
 
 }  // namespace
 
@@ -55,7 +71,8 @@ std::optional<Eigen::Matrix3d> InertialTracker::rotation_lidar(std::int64_t from
 
 std::optional<InertialMotion> InertialTracker::motion(std::int64_t last_ns, std::int64_t stamp_ns,
                                                       const SweepTimes& sweep) {
-  if (!trust_.is_believed()) return std::nullopt;
+  const auto newest_ns = track_.newest_ns();
+  if (!newest_ns) return std::nullopt;
   const std::int64_t middle_ns = stamp_ns + nanoseconds(sweep.middle_s);
   const int steps = static_cast<int>(
       std::min<double>(max_sweep_steps, std::ceil(sweep.duration_s / sweep_step_s)));
@@ -70,16 +87,35 @@ std::optional<InertialMotion> InertialTracker::motion(std::int64_t last_ns, std:
     is_whole = R_middle_at.has_value();
     if (is_whole) motion.R_middle_at.push_back(*R_middle_at);
   }
-  (is_whole ? counts_.scans_helped : counts_.scans_without_samples) += 1;
-  if (!is_whole) return std::nullopt;
+  if (!is_whole) {
+    counts_.scans_without_samples += 1;
+    const std::int64_t end_ns = middle_ns + nanoseconds(0.5 * sweep.duration_s);
+    samples_behind_s_ = seconds(imu_time(end_ns) - *newest_ns);
+    return std::nullopt;
+  }
+  (trust_.is_believed() ? counts_.scans_helped : counts_.scans_not_believed) += 1;
+  if (!trust_.is_believed()) return std::nullopt;
   return motion;
 }
 
-std::optional<Eigen::Vector3d> InertialTracker::up_lidar(std::int64_t time_ns) const {
-  if (!mount_is_known_) return std::nullopt;
-  const auto mean = track_.steady_mean(imu_time(time_ns - up_window_ns), imu_time(time_ns));
-  if (!mean) return std::nullopt;
-  return R_lidar_imu_ * mean->up_imu;
+UpDirection InertialTracker::up_lidar(std::int64_t time_ns) const {
+  if (!mount_is_known_)
+    return {.fault = "the sensor's file does not say how the IMU is fixed to the lidar ('imu')"};
+  const std::int64_t from_ns = imu_time(time_ns - up_window_ns);
+  auto mean = track_.steady_mean(from_ns, imu_time(time_ns));
+  if (!mean || mean->duration_s < min_up_s)
+    mean = track_.steady_mean(from_ns, imu_time(time_ns + up_window_after_ns));
+  if (!mean)
+    return {.fault =
+                "the lidar was shaken or turned, or the IMU says too little or always the same"};
+  if (mean->duration_s < min_up_s)
+    return {.fault = "its samples of the start are of less than 0.2 s"};
+  if (!is_gravity(mean->acceleration_m_s2)) {
+    std::ostringstream text;
+    text << "it measures " << mean->acceleration_m_s2 << " m/s^2 at rest, which is not gravity";
+    return {.fault = text.str()};
+  }
+  return {.up_lidar = R_lidar_imu_ * mean->up_imu};
 }
 
 void InertialTracker::learn(std::int64_t from_ns, std::int64_t to_ns,
@@ -96,6 +132,8 @@ void InertialTracker::learn(std::int64_t from_ns, std::int64_t to_ns,
   const Eigen::Vector3d missing =
       rotation_vector(Eigen::Quaterniond(R_gyro->transpose() * R_from_to));
   if (last_rate) trust_.add(registered, missing, registered - duration_s * *last_rate);
+  if (registered.norm() > min_turn_rad) unbelieved_turn_rad_ += registered.norm();
+  if (trust_.is_believed()) unbelieved_turn_rad_ = 0.0;
   (void)calibration_.learn_from_rotation(R_lidar_imu_.conjugate() * missing, duration_s,
                                          *rate_to - *rate_from);
   learn_at_rest(from_ns, to_ns, registered);

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "core/inertial/gyro_calibration.hpp"
 #include "core/inertial/gyro_trust.hpp"
@@ -18,12 +19,21 @@ struct InertialCounts {
   std::uint64_t samples = 0;
   std::uint64_t not_usable = 0;
   std::uint64_t out_of_order = 0;
-  /// Scans whose rotation the IMU told, and scans that samples were missing for, as they came too
-  /// late, had a gap or said the same again and again.
+  /// Scans whose rotation the IMU told; that samples were missing for, as they came too late, had a
+  /// gap or said the same again and again; and whose rotation it was not believed to tell.
   std::uint64_t scans_helped = 0;
   std::uint64_t scans_without_samples = 0;
+  std::uint64_t scans_not_believed = 0;
   /// How often the gyro was no longer believed (see GyroTrust).
   std::uint64_t trust_losses = 0;
+};
+
+/// Which way is up by an IMU at rest, or why it does not tell.
+struct UpDirection {
+  /// Unit vector against gravity along the lidar's axes.
+  std::optional<Eigen::Vector3d> up_lidar{};
+  /// Empty where it tells.
+  std::string fault{};
 };
 
 /// Follows an IMU that is fixed to the lidar: tells the lidar's rotation and which way is up, and
@@ -39,9 +49,10 @@ class InertialTracker {
   [[nodiscard]] std::optional<InertialMotion> motion(std::int64_t last_ns, std::int64_t stamp_ns,
                                                      const SweepTimes& sweep);
 
-  /// Unit vector against gravity along the lidar's axes, from up to half a second before this time;
-  /// nothing where the lidar was shaken or turned, or the mount is not known.
-  [[nodiscard]] std::optional<Eigen::Vector3d> up_lidar(std::int64_t time_ns) const;
+  /// From up to half a second before this time and, where that is too short, from what is at hand
+  /// of the tenths of a second after it. Nothing where the lidar was shaken or turned, where what
+  /// is measured is not gravity, or where the mount is not known.
+  [[nodiscard]] UpDirection up_lidar(std::int64_t time_ns) const;
 
   /// The lidar's rotation between two times was found by registration.
   void learn(std::int64_t from_ns, std::int64_t to_ns, const Eigen::Matrix3d& R_from_to);
@@ -58,6 +69,11 @@ class InertialTracker {
   /// False before the first sample.
   [[nodiscard]] bool has_samples() const { return counts_.samples > 0; }
   [[nodiscard]] bool is_believed() const { return trust_.is_believed(); }
+  /// How far the lidar has turned, while there were samples, since the gyro is not believed [rad].
+  [[nodiscard]] double unbelieved_turn_rad() const { return unbelieved_turn_rad_; }
+  /// By how much the newest sample was before the end of the last sweep that samples were missing
+  /// for [s]; negative: after it. Nothing without such a sweep.
+  [[nodiscard]] std::optional<double> samples_behind_s() const { return samples_behind_s_; }
   [[nodiscard]] const GyroCalibration& calibration() const { return calibration_; }
   [[nodiscard]] InertialCounts counts() const;
 
@@ -76,6 +92,8 @@ class InertialTracker {
   GyroCalibration calibration_;
   GyroTrust trust_;
   InertialCounts counts_;
+  double unbelieved_turn_rad_ = 0.0;
+  std::optional<double> samples_behind_s_;
   /// Mean rate of turn between the last two poses [rad/s].
   std::optional<Eigen::Vector3d> last_rate_lidar_;
   /// Poses in a row that hardly turned, until they are far enough apart to learn from.

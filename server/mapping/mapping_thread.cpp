@@ -336,6 +336,7 @@ void MappingThread::map(QueuedScan queued) {
   if (!mapped) return drop(mapper_.last_rejection());
   steps_back_ = 0;
   imu_report_.update(mapper_.inertial());
+  imu_report_.tell(mapper_.levelling());
   const bool unlabelled = mapped->labelled.labels.empty();
   latest_map_.add_pose({stamp_ns, T_map_base(mapped->odometry)}, mapped->odometry.health,
                        unlabelled ? "none" : mapper_.label_source(), mapped->odometry.map_entry);

@@ -33,7 +33,7 @@ struct InertialDrive {
   InertialCounts counts;
 };
 
-/// Every scan comes with the samples of its sweep, as far as they are `true`.
+/// Every scan comes with the samples of its sweep, and those of two tenths of a second after it.
 InertialDrive drive(const Simulation& simulation, const std::vector<ImuSample>& samples) {
   MapperConfig config;
   config.sensor = simulation.config().sensor;
@@ -43,7 +43,7 @@ InertialDrive drive(const Simulation& simulation, const std::vector<ImuSample>& 
   std::size_t next = 0;
   for (int k = 0; k < simulation.config().scans; ++k) {
     Scan scan = simulation.scan(k).scan;
-    const std::int64_t end_ns = scan.stamp_ns + 120'000'000;
+    const std::int64_t end_ns = scan.stamp_ns + 300'000'000;
     while (next < samples.size() && samples[next].stamp_ns <= end_ns) mapper.add(samples[next++]);
     const auto mapped = mapper.process(std::move(scan));
     if (!mapped) break;
@@ -104,7 +104,7 @@ TEST(InertialDrives, GyroHelpsAHandheldLidarAndAWrongOneDoesNoHarm) {
 /// What an IMU at the lidar of a simulation measures before it sets off.
 std::vector<ImuSample> at_rest(const Simulation& simulation) {
   std::vector<ImuSample> samples;
-  for (int k = 0; k < 30; ++k) {
+  for (int k = 0; k < 60; ++k) {
     ImuSample sample;
     sample.stamp_ns = k * std::int64_t{5'000'000};
     sample.angular_velocity_imu = {0.004 + 1e-4 * (k % 3), -0.002, 1e-4 * (k % 5)};

@@ -129,14 +129,15 @@ TEST(InertialTracker, TellsUpAtRestAlongTheLidarsAxes) {
   InertialTracker tracker(imu.mount);
   std::mt19937 random(3);
   for (int k = 0; k < 200; ++k) tracker.add(sample_at(imu, k, random));
-  const auto up_lidar = tracker.up_lidar(900 * per_ms);
-  ASSERT_TRUE(up_lidar);
+  const UpDirection up = tracker.up_lidar(900 * per_ms);
+  const auto& up_lidar = up.up_lidar;
+  ASSERT_TRUE(up_lidar) << up.fault;
   EXPECT_LT((*up_lidar - Eigen::Vector3d::UnitZ()).norm(), 0.001);
   for (int k = 200; k < 500; ++k) tracker.add(sample_at(imu, k, random));
-  EXPECT_FALSE(tracker.up_lidar(2000 * per_ms)) << "it swings";
+  EXPECT_FALSE(tracker.up_lidar(2000 * per_ms).up_lidar) << "it swings";
   InertialTracker unknown_mount(std::nullopt);
   for (int k = 0; k < 200; ++k) unknown_mount.add(sample_at(imu, k, random));
-  EXPECT_FALSE(unknown_mount.up_lidar(900 * per_ms));
+  EXPECT_FALSE(unknown_mount.up_lidar(900 * per_ms).up_lidar);
 }
 
 TEST(InertialTracker, TakesASlowTurnForNoBias) {
@@ -158,6 +159,59 @@ TEST(InertialTracker, TakesASlowTurnForNoBias) {
     worst_rad_s = std::max(worst_rad_s, tracker.calibration().bias_imu().norm());
   }
   EXPECT_LT(worst_rad_s, 0.002);
+}
+
+/// What an IMU at rest tells of up at 1 s, from samples of these times [ms].
+UpDirection up_from(std::int64_t first_ms, std::int64_t last_ms, std::int64_t step_ms,
+                    const Eigen::Vector3d& acceleration) {
+  InertialTracker tracker(ImuMount{});
+  std::mt19937 random(2);
+  std::normal_distribution<double> noise(0.0, 0.002);
+  for (std::int64_t now_ms = first_ms; now_ms <= last_ms; now_ms += step_ms)
+    tracker.add({now_ms * per_ms, {noise(random), noise(random), noise(random)}, acceleration});
+  return tracker.up_lidar(1000 * per_ms);
+}
+
+TEST(InertialTracker, TellsUpWhateverTheRateOfTheImuFromATimeThatIsLongEnough) {
+  const Eigen::Vector3d gravity(0.0, 0.0, 9.81);
+  for (const std::int64_t step_ms : {1, 5, 20, 40}) {
+    EXPECT_TRUE(up_from(520, 1000, step_ms, gravity).up_lidar) << step_ms;
+    EXPECT_TRUE(up_from(800, 1000, step_ms, gravity).up_lidar) << step_ms;
+    EXPECT_FALSE(up_from(960, 1000, step_ms, gravity).up_lidar) << step_ms;
+    // A recording that begins with its first scan.
+    EXPECT_TRUE(up_from(900, 1200, step_ms, gravity).up_lidar) << step_ms;
+  }
+  const UpDirection braking = up_from(990, 1000, 1, {-3.0, 0.0, 9.81});
+  EXPECT_FALSE(braking.up_lidar);
+  EXPECT_FALSE(braking.fault.empty());
+}
+
+TEST(InertialTracker, TakesOnlyGravityForUp) {
+  EXPECT_TRUE(up_from(500, 1000, 5, {0.0, 0.0, 9.6}).up_lidar);
+  EXPECT_TRUE(up_from(500, 1000, 5, {0.0, 0.0, 1.0}).up_lidar) << "in g";
+  EXPECT_FALSE(up_from(500, 1000, 5, {0.3, 0.1, 0.0}).up_lidar) << "gravity was taken out";
+  EXPECT_FALSE(up_from(500, 1000, 5, {8.0, 0.0, 9.81}).up_lidar);
+}
+
+TEST(InertialTracker, CountsScansWhoseSamplesAreNotBelievedOrMissing) {
+  InertialTracker in_degrees(ImuMount{});
+  EXPECT_FALSE(in_degrees.motion(0, 100 * per_ms, sweep));
+  EXPECT_EQ(in_degrees.counts().scans_without_samples, 0U) << "there is no IMU";
+  drive(in_degrees, {.mount = {}, .bias_imu = Eigen::Vector3d::Zero(), .unit = 57.2958}, 10.0);
+  EXPECT_FALSE(in_degrees.motion(9750 * per_ms, 9800 * per_ms, sweep));
+  EXPECT_EQ(in_degrees.counts().scans_not_believed, 1U);
+  EXPECT_GT(in_degrees.unbelieved_turn_rad(), 1.0);
+
+  InertialTracker other_clock(ImuMount{});
+  drive(other_clock, {.mount = {Eigen::Matrix3d::Identity(), -37.0}}, 10.0);
+  EXPECT_FALSE(other_clock.motion(9750 * per_ms, 9800 * per_ms, sweep));
+  EXPECT_EQ(other_clock.counts().scans_without_samples, 1U);
+  ASSERT_TRUE(other_clock.samples_behind_s());
+  EXPECT_NEAR(*other_clock.samples_behind_s(), 37.0, 0.2);
+
+  InertialTracker good(ImuMount{});
+  drive(good, {}, 10.0);
+  EXPECT_EQ(good.unbelieved_turn_rad(), 0.0);
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ ServerConfig front_and_rear() {
   return config;
 }
 
-Scan scan_of(const std::vector<float>& xs) {
+Scan points_ahead(const std::vector<float>& xs) {
   Scan scan;
   scan.stamp_ns = 1'000'000'000;
   for (const float x : xs) scan.points_lidar.emplace_back(x, 0.0F, 0.0F);
@@ -34,8 +34,8 @@ std::vector<float> left_of_sweep(const ServerConfig& config) {
   ScanQueue queue(3);
   Statistics statistics;
   SweepInput sweeps(config, queue, statistics);
-  sweeps.add(0, scan_of({1.0F, 10.0F, 50.0F}), {});
-  sweeps.add(1, scan_of({1.0F, 10.0F, 50.0F}), {});
+  sweeps.add(0, points_ahead({1.0F, 10.0F, 50.0F}), {});
+  sweeps.add(1, points_ahead({1.0F, 10.0F, 50.0F}), {});
   std::vector<float> xs;
   if (const auto queued = queue.try_pop())
     for (const Eigen::Vector3f& point : queued->scan.points_lidar) xs.push_back(point.x());

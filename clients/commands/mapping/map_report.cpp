@@ -196,6 +196,20 @@ Json to_json(const MappingResult& result, const MapOutput& output) {
       {"folder", output.folder.string()}};
 }
 
+std::string describe_imu(const MappingResult& result) {
+  const InertialCounts& imu = result.imu;
+  std::string text = "IMU: " + std::to_string(imu.samples) + " samples helped " +
+                     std::to_string(imu.scans_helped) + " scans, were missing for " +
+                     std::to_string(imu.scans_without_samples) + " and not believed for " +
+                     std::to_string(imu.scans_not_believed);
+  if (!result.levelling) return text;
+  constexpr double deg_per_rad = 180.0 / std::numbers::pi;
+  if (!result.levelling->fault.empty())
+    return text + "; it does not level the map: " + result.levelling->fault;
+  return text + "; it levels the map, in which the lidar leans by " +
+         fixed(deg_per_rad * result.levelling->tilt_rad, 1) + " degrees at the start";
+}
+
 std::string describe(const MappingResult& result, const MapOutput& output) {
   std::string text = describe_stages(result.stages);
   text += std::to_string(result.trajectory.size()) + " scans mapped in " +
@@ -204,10 +218,7 @@ std::string describe(const MappingResult& result, const MapOutput& output) {
   for (const auto& [state, count] : result.health) {
     text += std::string(" ") + name(state) + " " + std::to_string(count);
   }
-  if (result.imu.samples > 0) {
-    text += "; IMU: " + std::to_string(result.imu.samples) + " samples helped " +
-            std::to_string(result.imu.scans_helped) + " scans";
-  }
+  if (result.imu.samples > 0) text += "; " + describe_imu(result);
   text += "\nmap: " + std::to_string(voxel_count(*result.view)) + " voxels of " +
           fixed(result.view->voxel_size_m, 2) + " m in " +
           std::to_string(result.view->tiles.size()) + " tiles; peak memory " +

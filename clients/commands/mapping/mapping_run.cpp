@@ -132,6 +132,7 @@ class MappingRun {
     result_.tile_evidence = std::move(map.tile_evidence);
     result_.label_source = mapper_.label_source();
     result_.imu = mapper_.inertial().counts();
+    result_.levelling = mapper_.levelling();
     result_.stages = times_.stages();
     result_.stopped = stopped;
     return std::move(result_);

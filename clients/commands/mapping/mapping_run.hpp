@@ -60,6 +60,8 @@ struct MappingResult {
   std::map<OdometryHealth, std::size_t> health;
   /// What became of the samples of the data set's IMU.
   InertialCounts imu;
+  /// Nothing where no IMU was asked.
+  std::optional<Levelling> levelling;
   /// Against the moving ids of the data set, where it has labels.
   evaluation::MovingScore moving;
   std::vector<StageDurations> stages;
