@@ -51,5 +51,11 @@ TEST(SampleFeed, AGapIsCaughtUpWith) {
   EXPECT_EQ(taken, 2U);
 }
 
+TEST(SampleFeed, HandsOutSamplesThatAreLate) {
+  constexpr std::int64_t max_late_ns = 150'000'000;
+  SampleFeed<Sample> feed({{0}, {max_late_ns}, {second_ns}});
+  EXPECT_EQ(feed.take_up_to_end_of(scan_of(0), 0.1).size(), 2U);
+}
+
 }  // namespace
 }  // namespace stillmap::cli

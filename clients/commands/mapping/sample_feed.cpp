@@ -7,8 +7,8 @@
 namespace stillmap::cli {
 namespace {
 
-/// Delay of samples that a mapper can make up for.
-constexpr std::int64_t margin_ns = 100'000'000;
+/// More than the delay of samples that a mapper can make up for.
+constexpr std::int64_t margin_ns = 200'000'000;
 
 }  // namespace
 
