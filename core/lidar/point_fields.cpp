@@ -51,6 +51,29 @@ std::vector<double> sample_of(std::span<const double> times) {
   return sample;
 }
 
+/// Times of a counter of 32 bits that began anew within the scan, as if it had gone on. Nothing of
+/// a counter that did not.
+std::vector<double> unwrapped(std::span<const double> times) {
+  constexpr double full_turn = 4294967296.0;
+  // All points are that near one of the counter's ends.
+  constexpr double max_from_end = full_turn / 8.0;
+  // Fewer before it began anew are broken ones.
+  constexpr std::size_t min_share_before = 20;
+  std::size_t before = 0;
+  std::size_t after = 0;
+  for (const double t : times) {
+    if (!std::isfinite(t) || t == 0.0) continue;
+    const bool is_before = t >= full_turn - max_from_end && t < full_turn;
+    const bool is_after = t > 0.0 && t < max_from_end;
+    if (!is_before && !is_after) return {};
+    (is_before ? before : after) += 1;
+  }
+  if (after == 0 || before * min_share_before < times.size()) return {};
+  std::vector<double> going_on(times.begin(), times.end());
+  for (double& t : going_on) t += t < max_from_end ? full_turn : 0.0;
+  return going_on;
+}
+
 double median_of(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::ranges::nth_element(values, middle);
@@ -154,6 +177,9 @@ std::string remark(float full_scale) {
 }  // namespace
 
 PointTimes point_times(std::span<const double> times, TimeType type, std::int64_t stamp_ns) {
+  const std::vector<double> going_on =
+      type == TimeType::integer ? unwrapped(times) : std::vector<double>{};
+  if (!going_on.empty()) times = going_on;
   std::vector<double> sample = sample_of(times);
   if (sample.empty()) return {{}, "no finite time"};
   const double middle = median_of(sample);

@@ -46,7 +46,8 @@ struct PointTimes {
 /// decides what is meant: those more than 10 s from it have no time (drivers write 0 where a packet
 /// was lost), and are not moved. Offsets within 1 s of zero are kept as they are. Larger values
 /// are absolute: the offset is then the distance to `stamp_ns` where that is the same clock (within
-/// 1 s), else to the earliest point. Absolute times in 32-bit floats are 128 s apart and therefore
+/// 1 s), else to the earliest point. A counter of 32 bits may
+/// begin anew within the scan. Absolute times in 32-bit floats are 128 s apart and therefore
 /// none.
 [[nodiscard]] PointTimes point_times(std::span<const double> times, TimeType type,
                                      std::int64_t stamp_ns);

@@ -244,5 +244,25 @@ TEST(IntensityScale, AScaleOfItsOwnIsKeptWhereItFits) {
   EXPECT_THAT(scale.apply(values), IsEmpty());
 }
 
+TEST(PointTimes, OfACounterThatBeginsAnewWithinTheScanGoOn) {
+  constexpr double full_turn = 4294967296.0;
+  constexpr int points = 1000;
+  // From the scan's first point on: ns of a counter that runs for 4.3 s.
+  for (const double before_s : {0.01, 0.05, 0.099}) {
+    Times times;
+    for (int i = 0; i < points; ++i)
+      times.push_back(std::fmod(full_turn + 1e8 * i / points - 1e9 * before_s, full_turn));
+    const std::vector<float> found = offsets(times, TimeType::integer);
+    ASSERT_EQ(found.size(), times.size()) << before_s;
+    EXPECT_NEAR(found.front(), 0.0F, 1e-6F) << before_s;
+    EXPECT_NEAR(found[points / 2], 0.05F, 1e-6F) << before_s;
+    EXPECT_NEAR(found.back(), 0.0999F, 1e-6F) << before_s;
+  }
+  // A broken time is no such counter.
+  Times times(points, 2e7);
+  times[7] = full_turn - 1e7;
+  EXPECT_FLOAT_EQ(offsets(times, TimeType::integer).front(), 0.02F);
+}
+
 }  // namespace
 }  // namespace stillmap
