@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <string_view>
 #include <utility>
 
 #include "server/monitoring/shown_name.hpp"
@@ -13,6 +14,11 @@ using Clock = std::chrono::steady_clock;
 
 // Less is the rounding of a quaternion, not another place.
 constexpr double same_mount = 1e-6;
+
+// tf2 knows none with a '/' at its front, which drivers of old send.
+std::string_view tf2_name(std::string_view frame) {
+  return frame.substr(frame.starts_with('/') ? 1 : 0);
+}
 
 }  // namespace
 
@@ -94,7 +100,9 @@ std::optional<Eigen::Isometry3d> RobotFrames::T_lidar_frame(const std::string& f
   const Eigen::Isometry3d T_lidar_base = T_base_lidar_.inverse();
   if (frame.empty()) return std::nullopt;
   if (has_base() && frame == frames_.base) return T_lidar_base;
-  if (frame == lidar_ || frame == cloud_frame_) return Eigen::Isometry3d::Identity();
+  const std::string_view name = tf2_name(frame);
+  if (name == tf2_name(lidar_) || name == tf2_name(cloud_frame_))
+    return Eigen::Isometry3d::Identity();
   if (static_transforms_ == nullptr) return std::nullopt;
   const auto T_base_frame = static_transforms_->find(frames_.base, frame);
   if (!T_base_frame) return std::nullopt;

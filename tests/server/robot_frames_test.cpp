@@ -116,5 +116,16 @@ TEST(RobotFrames, ShowsNoMoreOfAForeignNameThanALine) {
   EXPECT_LT(frames.missing().size(), 1000U);
 }
 
+TEST(RobotFrames, KnowsTheLidarWithOrWithoutASlash) {
+  ServerConfig config = mounted();
+  config.frames.lidar = "";
+  Statistics statistics;
+  RobotFrames frames(config, nullptr, statistics);
+  ASSERT_TRUE(frames.locate_lidar("/velodyne", true));
+  EXPECT_TRUE(frames.T_lidar_frame("velodyne"));
+  EXPECT_TRUE(frames.T_lidar_frame("/velodyne"));
+  EXPECT_FALSE(frames.T_lidar_frame("imu"));
+}
+
 }  // namespace
 }  // namespace stillmap::server
