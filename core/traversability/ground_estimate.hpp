@@ -60,8 +60,8 @@ inline constexpr double max_filled_gap_m = 6.0;
 /// the footprints of vehicles removed from the map. A cell is filled if a straight line through it
 /// (along an axis or a diagonal) meets measured ground at both ends,
 ///   - over a gap of at most `max_filled_gap_m`,
-///   - with no object on the ground in the gap, and no pit: two cells in a row that were measured
-///     farther down,
+///   - with no object on the ground in the gap, and no pit: two cells side by side that were
+///     measured farther down, in the gap, beside it or below the ground at its ends,
 ///   - of the same class at both ends (road, parking and other-ground count as one),
 ///   - and the far end lies on the extrapolated slopes of both ends: no step in between;
 /// over more than `max_bare_gap_m`, ground in a third direction, near and of that class, must lie

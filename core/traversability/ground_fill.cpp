@@ -94,8 +94,9 @@ class Holes {
   [[nodiscard]] std::optional<double> slope_at(const End& end, Direction outwards) const;
   [[nodiscard]] bool is_one_surface(const End& a, const End& b, std::size_t direction) const;
   [[nodiscard]] std::optional<Line> line_through(int x, int y, std::size_t direction) const;
-  /// Whether the cell was measured farther down, and one beside it, too.
-  [[nodiscard]] bool is_in_pit(int x, int y, float ground_m) const;
+  /// Whether the cell was measured farther down than ground falls off so far from ground, and one
+  /// beside it, too: one alone may be a reflection.
+  [[nodiscard]] bool is_in_pit(int x, int y, float ground_m, double distance_m) const;
   [[nodiscard]] bool has_third_direction(int x, int y, std::size_t direction,
                                          const GroundCell& cell) const;
 
@@ -134,11 +135,11 @@ Reach Holes::reach_from(int x, int y, std::size_t direction) const {
   if (distance_m > max_filled_gap_m) return 0;
   const GroundCell& end = seen_(x + cells * d.dx, y + cells * d.dy);
   if (has_object(columns_(x, y), end.height_m)) return 0;
-  // A pit or a ditch was measured where two cells in a row fall away; one alone may be a
-  // reflection.
-  const bool is_pit = cells > 1 && falls_away(columns_(x, y), end.height_m, distance_m) &&
-                      falls_away(columns_(next_x, next_y), end.height_m, distance_m);
-  return is_pit ? Reach{0} : static_cast<Reach>(cells);
+  if (is_in_pit(x, y, end.height_m, distance_m)) return 0;
+  // The wall of a pit may lie below the ground at its edge.
+  const bool is_beside_end = cells == 1;
+  if (is_beside_end && is_in_pit(next_x, next_y, end.height_m, 0.0)) return 0;
+  return static_cast<Reach>(cells);
 }
 
 std::optional<Holes::End> Holes::end(int x, int y, std::size_t direction) const {
@@ -214,15 +215,15 @@ std::optional<GroundCell> Holes::inferred(int x, int y) const {
     if (best && std::abs(best->cell.height_m - line->cell.height_m) > disagreement_m) return {};
     if (!best || line->gap_m < best->gap_m) best = line;
   }
-  if (!best || is_in_pit(x, y, best->cell.height_m)) return std::nullopt;
+  if (!best || is_in_pit(x, y, best->cell.height_m, 0.0)) return std::nullopt;
   return best->cell;
 }
 
-bool Holes::is_in_pit(int x, int y, float ground_m) const {
-  if (!falls_away(columns_(x, y), ground_m, 0.0)) return false;
+bool Holes::is_in_pit(int x, int y, float ground_m, double distance_m) const {
+  if (!falls_away(columns_(x, y), ground_m, distance_m)) return false;
   return std::ranges::any_of(directions, [&](const Direction& d) {
-    return seen_.contains(x + d.dx, y + d.dy) && !seen_(x + d.dx, y + d.dy).is_known() &&
-           falls_away(columns_(x + d.dx, y + d.dy), ground_m, d.length() * cell_m_);
+    return columns_.contains(x + d.dx, y + d.dy) &&
+           falls_away(columns_(x + d.dx, y + d.dy), ground_m, distance_m + d.length() * cell_m_);
   });
 }
 

@@ -132,5 +132,37 @@ TEST(GroundFill, NothingIsInferredBeyondTheEdgeOfWhatWasSeen) {
   EXPECT_EQ(look(*view, 2.5, 0.1).cell.state, CellState::unknown);
 }
 
+TEST(GroundFill, NotOverATrenchOfWhichOnlyTheFarWallWasMeasured) {
+  // From in front of it a lidar sees neither its bottom nor its near wall. The far wall is one cell
+  // deep: in the gap, or in the column of the ground at its edge.
+  for (const double width_m : {1.0, 1.6, 2.4}) {
+    for (const double wall_m : {width_m - 0.2, width_m}) {
+      for (const SemanticClass wall : {building, road}) {
+        VoxelWorld world;
+        world.ground(-6, -6, 8, 6, road);
+        world.clear(0.0, -6, width_m, 6);
+        world.block(wall_m, -6, wall_m + 0.2, 6, -0.9, -0.2, wall);
+        const auto view = traversability_of(world.view(), square_robot());
+        for (double x_m = 0.1; x_m < width_m; x_m += 0.2) {
+          for (const double y_m : {-3.9, 0.1, 3.9})
+            EXPECT_NE(look(*view, x_m, y_m).cell.state, CellState::free)
+                << width_m << " m wide, " << name(wall) << " at " << wall_m << ": " << x_m;
+        }
+      }
+    }
+  }
+}
+
+TEST(GroundFill, OneReflectionBelowTheGroundIsNoPit) {
+  for (const double x_m : {0.0, 1.0}) {  // in the gap, and below the ground at its edge
+    VoxelWorld world;
+    world.ground(-6, -6, 6, 6, road);
+    world.clear(0.0, -6, 1.0, 6);
+    world.block(x_m, 0.0, x_m + 0.2, 0.2, -0.9, -0.8, unlabeled);
+    const auto view = traversability_of(world.view(), square_robot());
+    EXPECT_EQ(surface_at(*view, 0.5, 0.1).ground.origin, GroundOrigin::inferred) << x_m;
+  }
+}
+
 }  // namespace
 }  // namespace stillmap
