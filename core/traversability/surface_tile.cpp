@@ -80,14 +80,20 @@ void set_plane(const PlaneFit& fit, SurfaceShape& shape) {
   shape.roughness_m = static_cast<float>(std::sqrt(rest / n));
 }
 
-/// Rise per cell on one side, from the nearest cell to `rise_cells` out.
+/// Rise per cell on one side: the smaller of those from the nearest cell to the next and on to the
+/// last of `rise_cells`, and none where they differ in sign. A slope has both; of the rest of a
+/// blurred edge, or of the next step, one.
 std::optional<double> rise_beyond(const GroundGrid& ground, int x, int y, std::pair<int, int> d,
                                   int sign) {
+  static_assert(rise_cells == 3);
   const auto near_m = height_at(ground, x + sign * d.first, y + sign * d.second);
-  const auto far_m =
-      height_at(ground, x + sign * rise_cells * d.first, y + sign * rise_cells * d.second);
-  if (!near_m || !far_m) return std::nullopt;
-  return sign * (*far_m - *near_m) / (rise_cells - 1);
+  const auto middle_m = height_at(ground, x + sign * 2 * d.first, y + sign * 2 * d.second);
+  const auto far_m = height_at(ground, x + sign * 3 * d.first, y + sign * 3 * d.second);
+  if (!near_m || !middle_m || !far_m) return std::nullopt;
+  const double first_m = sign * (*middle_m - *near_m);
+  const double second_m = sign * (*far_m - *middle_m);
+  if (first_m * second_m <= 0.0) return 0.0;
+  return std::abs(first_m) < std::abs(second_m) ? first_m : second_m;
 }
 
 double step_along(const GroundGrid& ground, int x, int y, std::pair<int, int> d) {

@@ -24,8 +24,8 @@ struct SurfaceShape {
 
 /// Shape of the ground at a cell. The plane is fitted to cells of the same class, so that a kerb
 /// beside it is a step and not a slope. A step is the height difference across the cell, from one
-/// side to the other (or to the cell itself where a side has no ground), less the rise of the
-/// ground on either side. @pre the cell's ground is known
+/// side to the other (or to the cell itself where a side has no ground), less the rise that goes on
+/// from cell to cell on either side. @pre the cell's ground is known
 [[nodiscard]] SurfaceShape shape_at(const GroundGrid& ground, int x, int y, double cell_m);
 
 /// Ground of a cell, independent of the robot.

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -96,6 +98,34 @@ TEST(SurfaceShape, ANeighbourWithoutGroundLeavesTheOtherSide) {
     if (x == middle - 1) ground(x, y) = {};
   });
   EXPECT_NEAR(shape_in_the_middle(ground).step_m, 0.2, 1e-5);
+}
+
+/// Largest step of the middle row.
+double largest_step_m(const GroundGrid& ground) {
+  double step_m = 0.0;
+  for (int x = 4; x <= 2 * middle - 4; ++x)
+    step_m = std::max(step_m, static_cast<double>(shape_at(ground, x, middle, cell_m).step_m));
+  return step_m;
+}
+
+TEST(SurfaceShape, ASecondStepCloseByIsNoSlope) {
+  for (const double apart_m : {0.2, 0.4, 0.6}) {
+    const GroundGrid ground = ground_of([&](double x, double) {
+      return (x < -0.1 ? 0.0 : 0.12) + (x < apart_m - 0.1 ? 0.0 : 0.12);
+    });
+    EXPECT_GT(largest_step_m(ground), 0.119) << apart_m;
+  }
+}
+
+TEST(SurfaceShape, TheRestOfABlurredEdgeIsNoSlope) {
+  // A kerb on a border of voxels: the noise puts parts of its face in the cells on both sides.
+  const std::array<double, 4> shares{0.1, 0.4, 0.8, 1.0};
+  const GroundGrid ground = ground_of([&](double x, double) {
+    const auto i = std::lround(x / cell_m);
+    if (i < 0) return 0.0;
+    return 0.15 * (i < 4 ? shares.at(static_cast<std::size_t>(i)) : 1.0);
+  });
+  EXPECT_GT(largest_step_m(ground), 0.09);
 }
 
 }  // namespace
