@@ -74,7 +74,7 @@ std::optional<ReplanReason> PathMonitor::update(const TraversabilityView& view) 
   }
   on_path_ = std::move(now);
   if (changed.empty()) return std::nullopt;
-  const PathCheck check = check_path(view, path_map_);
+  const PathCheck check = check_long_path(view, path_map_);
   if (check.conflict) return ReplanReason{text_of(*check.conflict), check.conflict};
   return ReplanReason{text_of(changed.front(), changed.size()), std::nullopt};
 }

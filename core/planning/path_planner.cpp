@@ -127,12 +127,12 @@ void set_poses(const TraversabilityView& view, std::span<const PathPoint> path, 
   plan.cost = path.back().cost;
 }
 
-/// Sets the path if check_path finds it free; downsampled if it then stays free.
+/// Sets the path if check_long_path finds it free; downsampled if it then stays free.
 bool set_path(const TraversabilityView& view, const std::vector<PathPoint>& path, PathPlan& plan) {
   constexpr double spacing_m = 0.25;
   for (const std::vector<PathPoint>& candidate : {downsampled(path, spacing_m), path}) {
     set_poses(view, candidate, plan);
-    const PathCheck check = check_path(view, plan.path_map());
+    const PathCheck check = check_long_path(view, plan.path_map());
     if (!check.is_free) continue;
     plan.clearance_m = check.clearance_m;
     plan.inferred_m = check.inferred_m;

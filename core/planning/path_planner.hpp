@@ -91,7 +91,7 @@ struct PathPlan {
   /// The free cell nearest to a blocked start or goal, if any.
   std::optional<NearestTraversable> nearby;
 
-  /// From start to goal; free according to check_path.
+  /// From start to goal; free according to check_long_path.
   std::vector<PlannedPose> poses;
   double length_m = 0.0;
   /// Part of it in reverse [m].
@@ -116,7 +116,7 @@ struct PathPlan {
 /// Plans a path for the view's robot: the whole footprint stays on free cells (or unknown ones, if
 /// the profile allows them) at every pose, and curves keep to the minimum turning radius. A coarse
 /// route over the cells detects early that there is no path; OMPL then searches around it.
-/// check_path verifies every path that is returned.
+/// check_long_path verifies every path that is returned.
 ///
 /// NOT thread-safe: OMPL's seed is global. Throws std::invalid_argument for a configuration with
 /// faults.

@@ -43,10 +43,14 @@ inline constexpr std::size_t max_path_poses = 100'000;
 
 /// Checks the robot's oriented footprint along the poses, interpolated linearly, in steps in which
 /// no part of it moves more than half a cell. A path may be a single pose. An empty path and poses
-/// that are not finite are invalid requests. Inscribed cells are no conflict: the footprint itself
-/// is tested.
+/// that are not finite are invalid requests, paths that would take too long are too large.
+/// Inscribed cells are no conflict: the footprint itself is tested.
 [[nodiscard]] PathCheck check_path(const TraversabilityView& view,
                                    std::span<const PlanarPose> path_map);
+
+/// As check_path, for paths of any length that no client sent: those of the planner.
+[[nodiscard]] PathCheck check_long_path(const TraversabilityView& view,
+                                        std::span<const PlanarPose> path_map);
 
 /// A path to check, with or without headings.
 struct PathQuery {

@@ -198,5 +198,41 @@ TEST(PathPlanner, RefusesAConfigurationWithFaults) {
   }
 }
 
+/// Free ground without a tile's surface to compute: from (0, 0), by whole tiles of 100 cells.
+TraversabilityView free_ground(const RobotProfile& robot, double cell_m, int columns, int rows) {
+  constexpr int side = 100;
+  auto surface = std::make_shared<SurfaceTile>();
+  surface->side = side;
+  surface->cells.resize(side * side);
+  for (SurfaceCell& cell : surface->cells) cell.ground.origin = GroundOrigin::seen;
+  surface->begin.assign(side * side + 1, 0);
+  TraversabilityCell free;
+  free.state = CellState::free;
+  free.clearance_m = static_cast<float>(clearance_limit_m(robot));
+  TraversabilityView view;
+  view.version = view.map_id = 1;
+  view.cell_m = cell_m;
+  view.tile_size_m = side * cell_m;
+  view.profile = robot;
+  for (int x = 0; x < columns; ++x) {
+    for (int y = 0; y < rows; ++y) {
+      const TraversabilityTile tile{{x, y}, 1, side, {side * side, free}, surface};
+      view.tiles.push_back(std::make_shared<const TraversabilityTile>(tile));
+    }
+  }
+  return view;
+}
+
+TEST(PathPlanner, APathThatIsTooLongForOneCheckIsFound) {
+  RobotProfile robot = square_robot();
+  robot.length_m = robot.width_m = 14.0;
+  const TraversabilityView view = free_ground(robot, 0.1, 18, 6);
+  const PathPlan plan = plan_path(view, {{20, 30}, 0.0}, {{160, 30}, 0.0});
+  EXPECT_EQ(plan.status, PlanStatus::found) << plan.reason;
+  EXPECT_NEAR(plan.length_m, 140.0, 1.0);
+  EXPECT_GT(plan.clearance_m, 0.0);
+  EXPECT_EQ(check_path(view, plan.path_map()).status, TraversabilityStatus::too_large);
+}
+
 }  // namespace
 }  // namespace stillmap
