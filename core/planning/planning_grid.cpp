@@ -74,8 +74,10 @@ PlanningGrid::PlanningGrid(const TraversabilityView& view, const Eigen::AlignedB
   for (int i = 0; i < discs; ++i) {
     disc_ahead_m_.push_back(profile_.centre_ahead_m + (i + 0.5 - 0.5 * discs) * piece_m);
   }
-  disc_radius_m_ = std::hypot(0.5 * (piece_m + cell_m_), 0.5 * (profile_.width_m + cell_m_)) +
-                   half_diagonal * cell_m_;
+  // A cell that is touched lies with its centre half a diagonal farther away at most, and so does
+  // the centre of a disc from that of its own cell.
+  disc_radius_m_ =
+      std::hypot(0.5 * piece_m, 0.5 * profile_.width_m) + 2.0 * half_diagonal * cell_m_;
   // Larger distances are never compared: the discs are no smaller than the inscribed circle.
   distances_m_ = distances_to_marked(closed, disc_radius_m_ / cell_m_ + 1.0);
   for_each_cell(closed, [&](int x, int y) {
@@ -116,22 +118,10 @@ bool PlanningGrid::is_free(const PlanarPose& pose) const {
 
 /// Exact test over the cells of visit_footprint, for poses that the distances do not decide.
 bool PlanningGrid::is_closed_under(const PlanarPose& pose) const {
-  const Eigen::Vector2d ahead(std::cos(pose.heading_rad), std::sin(pose.heading_rad));
-  const Eigen::Vector2d left(-ahead.y(), ahead.x());
-  const Eigen::Vector2d centre_map = pose.position_map + profile_.centre_ahead_m * ahead;
-  const double half_length_m = 0.5 * (profile_.length_m + cell_m_);
-  const double half_width_m = 0.5 * (profile_.width_m + cell_m_);
-  const Eigen::Vector2d reach_m = half_length_m * ahead.cwiseAbs() + half_width_m * left.cwiseAbs();
-  const CellIndex low = cell_of(centre_map - reach_m);
-  const CellIndex high = cell_of(centre_map + reach_m);
-  for (int y = low.y; y <= high.y; ++y) {
-    for (int x = low.x; x <= high.x; ++x) {
-      if (distances_m_(x, y) > 0.0F) continue;
-      const Eigen::Vector2d offset_m = centre_of({x, y}) - centre_map;
-      if (std::abs(offset_m.dot(ahead)) <= half_length_m &&
-          std::abs(offset_m.dot(left)) <= half_width_m) {
-        return true;
-      }
+  const FootprintCells cells(profile_, pose, cell_m_);
+  for (int y = cells.low().y; y <= cells.high().y; ++y) {
+    for (int x = cells.low().x; x <= cells.high().x; ++x) {
+      if (distances_m_(x - origin_.x, y - origin_.y) <= 0.0F && cells.has({x, y})) return true;
     }
   }
   return false;

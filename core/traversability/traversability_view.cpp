@@ -249,25 +249,31 @@ CellLookup::Found CellLookup::at(CellIndex cell) {
   return {last_->at(x, y), last_->surface->at(x, y).cell};
 }
 
+FootprintCells::FootprintCells(const RobotProfile& profile, const PlanarPose& pose, double cell_m)
+    : cell_m_(cell_m),
+      ahead_(std::cos(pose.heading_rad), std::sin(pose.heading_rad)),
+      centre_map_(pose.position_map + profile.centre_ahead_m * ahead_) {
+  // A square and a rectangle overlap if their projections on the sides of both do: here on those of
+  // the squares, and with half of a square's projection on those of the footprint.
+  const Eigen::Vector2d across = ahead_.cwiseAbs();
+  const Eigen::Vector2d reach_m =
+      0.5 * (profile.length_m * across + profile.width_m * across.reverse());
+  const double half_square_m = 0.5 * cell_m * across.sum();
+  half_length_m_ = 0.5 * profile.length_m + half_square_m;
+  half_width_m_ = 0.5 * profile.width_m + half_square_m;
+  // What ends on a cell's border touches both sides of it.
+  const Eigen::Vector2d low = ((centre_map_ - reach_m) / cell_m).array().ceil() - 1.0;
+  const Eigen::Vector2d high = ((centre_map_ + reach_m) / cell_m).array().floor();
+  low_ = {static_cast<std::int32_t>(low.x()), static_cast<std::int32_t>(low.y())};
+  high_ = {static_cast<std::int32_t>(high.x()), static_cast<std::int32_t>(high.y())};
+}
+
 void visit_footprint(const TraversabilityView& view, const PlanarPose& pose,
                      const std::function<void(CellIndex)>& visit) {
-  const RobotProfile& profile = view.profile;
-  const Eigen::Vector2d ahead(std::cos(pose.heading_rad), std::sin(pose.heading_rad));
-  const Eigen::Vector2d left(-ahead.y(), ahead.x());
-  const Eigen::Vector2d centre_map = pose.position_map + profile.centre_ahead_m * ahead;
-  const double half_length_m = 0.5 * (profile.length_m + view.cell_m);
-  const double half_width_m = 0.5 * (profile.width_m + view.cell_m);
-  const Eigen::Vector2d reach_m = half_length_m * ahead.cwiseAbs() + half_width_m * left.cwiseAbs();
-  const Eigen::Vector2d low = ((centre_map - reach_m) / view.cell_m).array().floor();
-  const Eigen::Vector2d high = ((centre_map + reach_m) / view.cell_m).array().floor();
-  for (auto y = static_cast<std::int32_t>(low.y()); y <= static_cast<std::int32_t>(high.y()); ++y) {
-    for (auto x = static_cast<std::int32_t>(low.x()); x <= static_cast<std::int32_t>(high.x());
-         ++x) {
-      const Eigen::Vector2d offset_m = view.centre_of({x, y}) - centre_map;
-      if (std::abs(offset_m.dot(ahead)) <= half_length_m &&
-          std::abs(offset_m.dot(left)) <= half_width_m) {
-        visit({x, y});
-      }
+  const FootprintCells cells(view.profile, pose, view.cell_m);
+  for (std::int32_t y = cells.low().y; y <= cells.high().y; ++y) {
+    for (std::int32_t x = cells.low().x; x <= cells.high().x; ++x) {
+      if (cells.has({x, y})) visit({x, y});
     }
   }
 }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -148,9 +149,35 @@ struct PlanarPose {
   double heading_rad = 0.0;
 };
 
-/// Calls `visit(CellIndex)` for the cells that a robot at `pose` covers: those whose centre lies in
-/// its footprint enlarged by half a cell on every side, which are all that it touches, except at
-/// its corners. @pre view.cell_of(pose.position_map)
+/// The cells that a robot touches at a pose: those whose square overlaps its footprint.
+class FootprintCells {
+ public:
+  /// @pre the cell of the position exists (TraversabilityView::cell_of)
+  FootprintCells(const RobotProfile& profile, const PlanarPose& pose, double cell_m);
+
+  /// Corners of the box that holds them.
+  [[nodiscard]] CellIndex low() const { return low_; }
+  [[nodiscard]] CellIndex high() const { return high_; }
+  /// Whether a cell of this box is touched.
+  [[nodiscard]] bool has(CellIndex cell) const {
+    const Eigen::Vector2d offset_m =
+        cell_m_ * Eigen::Vector2d(cell.x + 0.5, cell.y + 0.5) - centre_map_;
+    return std::abs(offset_m.dot(ahead_)) <= half_length_m_ &&
+           std::abs(offset_m.x() * ahead_.y() - offset_m.y() * ahead_.x()) <= half_width_m_;
+  }
+
+ private:
+  double cell_m_;
+  Eigen::Vector2d ahead_;
+  Eigen::Vector2d centre_map_;
+  /// Of the footprint and a cell beside it.
+  double half_length_m_;
+  double half_width_m_;
+  CellIndex low_;
+  CellIndex high_;
+};
+
+/// Calls `visit(CellIndex)` for these cells. @pre view.cell_of(pose.position_map)
 void visit_footprint(const TraversabilityView& view, const PlanarPose& pose,
                      const std::function<void(CellIndex)>& visit);
 

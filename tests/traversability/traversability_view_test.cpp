@@ -3,8 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <limits>
 #include <numbers>
+#include <random>
+#include <set>
 #include <span>
 
 #include "core/traversability/path_check.hpp"
@@ -98,6 +101,46 @@ TEST(NearestTraversable, HostilePlacesGetAStatusAndAReason) {
   EXPECT_EQ(nearest_traversable(*view, {9e4, 0}).status, not_found);
   EXPECT_EQ(nearest_traversable(*traversability_of(MapSnapshot{}, square_robot()), {0, 0}).status,
             not_found);
+}
+
+/// Whether a place lies in the footprint, or within `beyond_m` of its sides.
+bool is_under(const RobotProfile& robot, const PlanarPose& pose, const Eigen::Vector2d& place_map,
+              double beyond_m) {
+  const Eigen::Vector2d p = Eigen::Rotation2Dd(-pose.heading_rad) * (place_map - pose.position_map);
+  return std::abs(p.x() - robot.centre_ahead_m) <= 0.5 * robot.length_m + beyond_m &&
+         std::abs(p.y()) <= 0.5 * robot.width_m + beyond_m;
+}
+
+TEST(VisitFootprint, VisitsTheCellsThatTheFootprintOverlapsAndNoOthers) {
+  TraversabilityView view;
+  view.cell_m = 0.2;
+  view.profile = square_robot();
+  view.profile.length_m = 1.7;
+  view.profile.centre_ahead_m = 0.4;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> place(0.0, 0.2);
+  std::uniform_real_distribution<double> heading(-4.0, 4.0);
+  for (int i = 0; i < 300; ++i) {
+    const PlanarPose pose{{place(random), place(random)},
+                          i % 3 == 0 ? std::numbers::pi / 4 : heading(random)};
+    std::set<std::pair<int, int>> visited;
+    visit_footprint(view, pose, [&](CellIndex cell) { visited.emplace(cell.x, cell.y); });
+    for (int y = -15; y < 15; ++y) {
+      for (int x = -15; x < 15; ++x) {
+        bool is_overlapped = false;
+        bool is_near = false;
+        for (int k = 0; k < 21 * 21; ++k) {
+          const Eigen::Vector2d p =
+              view.cell_m * Eigen::Vector2d(x + k % 21 / 20.0, y + k / 21 / 20.0);
+          is_overlapped = is_overlapped || is_under(view.profile, pose, p, -1e-6);
+          is_near = is_near || is_under(view.profile, pose, p, 0.01);
+        }
+        const bool is_visited = visited.contains({x, y});
+        ASSERT_TRUE(is_visited || !is_overlapped) << x << " " << y << ", " << pose.heading_rad;
+        ASSERT_TRUE(!is_visited || is_near) << x << " " << y << ", " << pose.heading_rad;
+      }
+    }
+  }
 }
 
 }  // namespace
