@@ -29,16 +29,28 @@ TraversabilityGridProvider::TraversabilityGridProvider(const TraversabilityConfi
       latest_map_(latest_map),
       traversability_(traversability) {}
 
-OccupancyGrid TraversabilityGridProvider::grid() const {
-  OccupancyGrid none;
+StampedGrid TraversabilityGridProvider::grid() const {
+  StampedGrid none;
   none.status = TraversabilityStatus::not_found;
   none.reason = "no grid is configured: traversability.grid_profile is empty";
   if (profile_.empty()) return none;
-  const auto view = traversability_.view(profile_);
-  OccupancyGrid grid = occupancy_grid(*view, window(), max_cells);
+  // Before the view: what it does not know of yet is then not missed.
+  const std::int64_t newest_ns = latest_map_.newest_pose().stamp_ns;
+  const std::uint64_t corrections = latest_map_.corrections();
+  const TraversabilitySnapshot::Known kept = traversability_.known(profile_);
+  // After a load or a reset what is kept is of the last map for a while.
+  if (kept.map && kept.map->map_id != latest_map_.view()->map_id) {
+    none.reason = "another map began, and has no grid yet; ask again in a moment";
+    return none;
+  }
+  return {grid_of(*kept.view), kept.corrections == corrections ? newest_ns : kept.stamp_ns};
+}
+
+OccupancyGrid TraversabilityGridProvider::grid_of(const TraversabilityView& view) const {
+  OccupancyGrid grid = occupancy_grid(view, window(), max_cells);
   if (grid.status != TraversabilityStatus::too_large) return grid;
-  const double edge_m = (std::sqrt(static_cast<double>(max_cells)) - 2.0) * view->cell_m;
-  OccupancyGrid part = occupancy_grid(*view, square_round_robot(edge_m), max_cells);
+  const double edge_m = (std::sqrt(static_cast<double>(max_cells)) - 2.0) * view.cell_m;
+  OccupancyGrid part = occupancy_grid(view, square_round_robot(edge_m), max_cells);
   if (part.status == TraversabilityStatus::ok) {
     part.reason = grid.reason + "; it shows " + std::to_string(std::lround(edge_m)) +
                   " m round the robot, less with traversability.grid_window_m";
@@ -46,8 +58,8 @@ OccupancyGrid TraversabilityGridProvider::grid() const {
   return part;
 }
 
-nav_msgs::msg::OccupancyGrid TraversabilityGridProvider::message(const OccupancyGrid& grid) const {
-  return wire::to_message(grid, latest_map_.newest_pose().stamp_ns, map_frame_);
+nav_msgs::msg::OccupancyGrid TraversabilityGridProvider::message(const StampedGrid& grid) const {
+  return wire::to_message(grid, grid.stamp_ns, map_frame_);
 }
 
 TraversabilityRegion TraversabilityGridProvider::window() const {
@@ -67,7 +79,7 @@ TraversabilityPublisher::TraversabilityPublisher(dds::Participant& participant,
       writer_(participant, topics.traversability.dds_name, topics.traversability.writer) {}
 
 void TraversabilityPublisher::publish() {
-  OccupancyGrid grid = grid_provider_.grid();
+  StampedGrid grid = grid_provider_.grid();
   if (grid.status == TraversabilityStatus::ok && !grid.reason.empty())
     throttled_log_.warn("grid", "the published grid is a part of the area: " + grid.reason);
   if (is_same_grid(grid, published_)) return;

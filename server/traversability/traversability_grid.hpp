@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "config/loaders/server_config.hpp"
@@ -13,6 +14,11 @@
 
 namespace stillmap::server {
 
+/// A grid, and the time at which its map frame was true.
+struct StampedGrid : OccupancyGrid {
+  std::int64_t stamp_ns = 0;
+};
+
 /// The traversability of one robot as an occupancy grid for Nav2. Thread-safe.
 class TraversabilityGridProvider {
  public:
@@ -20,14 +26,16 @@ class TraversabilityGridProvider {
                              const LatestMap& latest_map,
                              const TraversabilitySnapshot& traversability);
 
-  /// As of the last update. Its status is not ok without a robot or a map, and for a window off the
-  /// map. Where it would be too large, it is a square round the robot instead, and the reason says
-  /// so.
-  [[nodiscard]] OccupancyGrid grid() const;
-  /// The same with the newest scan's stamp; empty when the status is not ok.
-  [[nodiscard]] nav_msgs::msg::OccupancyGrid message(const OccupancyGrid& grid) const;
+  /// As of the last update, with the newest scan's stamp; after a correction of the map that the
+  /// update did not know, with that of its own time. Its status is not ok without a robot or a map,
+  /// for a window off the map, and until the first update after another map began. Where it would
+  /// be too large, it is a square round the robot instead, and the reason says so.
+  [[nodiscard]] StampedGrid grid() const;
+  /// Empty when the status is not ok.
+  [[nodiscard]] nav_msgs::msg::OccupancyGrid message(const StampedGrid& grid) const;
 
  private:
+  [[nodiscard]] OccupancyGrid grid_of(const TraversabilityView& view) const;
   [[nodiscard]] TraversabilityRegion window() const;
   [[nodiscard]] TraversabilityRegion square_round_robot(double edge_m) const;
 
@@ -48,7 +56,7 @@ class TraversabilityPublisher {
 
  private:
   const TraversabilityGridProvider& grid_provider_;
-  OccupancyGrid published_;
+  StampedGrid published_;
   ThrottledLog throttled_log_;
   dds::Writer<nav_msgs::msg::OccupancyGrid> writer_;
 };

@@ -55,12 +55,14 @@ std::vector<std::shared_ptr<const Tile>> tiles_round(
 }  // namespace
 
 void TraversabilitySnapshot::publish(Views views, std::shared_ptr<const MapSnapshot> map,
-                                     const TileRange& window, std::uint64_t corrections) {
+                                     const TileRange& window, std::uint64_t corrections,
+                                     std::int64_t stamp_ns) {
   const std::scoped_lock lock(mutex_);
   views_ = std::move(views);
   map_ = std::move(map);
   window_ = window;
   corrections_ = corrections;
+  stamp_ns_ = stamp_ns;
 }
 
 bool TraversabilitySnapshot::Known::has(const Tile& tile) const {
@@ -77,7 +79,7 @@ TraversabilitySnapshot::Known TraversabilitySnapshot::known(const std::string& p
   const auto found = std::ranges::find_if(
       views_, [&](const auto& candidate) { return candidate->profile.name == profile; });
   if (found == views_.end()) throw std::invalid_argument(unknown_profile(profile, views_));
-  return {*found, map_, window_, corrections_};
+  return {*found, map_, window_, corrections_, stamp_ns_};
 }
 
 TraversabilityCache::TraversabilityCache(const TraversabilitySnapshot& snapshot,

@@ -22,9 +22,10 @@ class TraversabilitySnapshot {
   using Views = std::vector<std::shared_ptr<const TraversabilityView>>;
 
   /// `map`: that they were computed from, where its tiles are in memory and in the window; null
-  /// before the first. `corrections`: LatestMap's, read before the map.
+  /// before the first. `corrections` and `stamp_ns`, that of its newest pose: LatestMap's, read
+  /// before the map.
   void publish(Views views, std::shared_ptr<const MapSnapshot> map, const TileRange& window,
-               std::uint64_t corrections = 0);
+               std::uint64_t corrections = 0, std::int64_t stamp_ns = 0);
 
   /// A view, and what of the map it knows.
   struct Known {
@@ -32,6 +33,7 @@ class TraversabilitySnapshot {
     std::shared_ptr<const MapSnapshot> map;
     TileRange window;
     std::uint64_t corrections = 0;
+    std::int64_t stamp_ns = 0;
 
     /// Whether the view has the tile's surface: one that was read from the disk since is not in it,
     /// one that is new will be.
@@ -49,6 +51,7 @@ class TraversabilitySnapshot {
   std::shared_ptr<const MapSnapshot> map_;
   TileRange window_;
   std::uint64_t corrections_ = 0;
+  std::int64_t stamp_ns_ = 0;
 };
 
 /// The traversability of any part of the map: the view that is kept up to date in the background,

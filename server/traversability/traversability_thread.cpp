@@ -87,6 +87,7 @@ void TraversabilityThread::follow_map(const std::stop_token& stop) {
   if (stop.stop_requested()) return;
   next_update_ = clock_.now() + std::chrono::duration_cast<Clock::duration>(period_);
   corrections_ = map_.latest.corrections();
+  stamp_ns_ = map_.latest.newest_pose().stamp_ns;
   const auto view = map_.latest.view();
   if (!known_ || known_->map_id != view->map_id) kept_.clear();
   known_ = view;
@@ -185,7 +186,7 @@ void TraversabilityThread::publish() {
   for (const RobotProfile& robot : traversability_.profiles()) {
     views.push_back(traversability_.view(robot.name));
   }
-  snapshot_.publish(std::move(views), known_, window_, corrections_);
+  snapshot_.publish(std::move(views), known_, window_, corrections_, stamp_ns_);
 }
 
 }  // namespace stillmap::server

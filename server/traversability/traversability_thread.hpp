@@ -66,6 +66,7 @@ class TraversabilityThread {
   bool has_begun_ = false;
   std::shared_ptr<const MapSnapshot> known_;
   std::uint64_t corrections_ = 0;
+  std::int64_t stamp_ns_ = 0;
   Eigen::Vector3d robot_map_ = Eigen::Vector3d::Zero();
   TileRange window_;
   std::set<TileId> kept_;

@@ -314,7 +314,7 @@ TEST_F(TraversabilityThreadTest, TheGridIsAWindowRoundTheRobot) {
   StampedPose pose{.stamp_ns = 5'000'000'000};
   pose.T_map_lidar.translation().x() = 4.0;
   latest_map_.add_pose(pose, OdometryHealth::good, "");
-  const OccupancyGrid grid = window.grid();
+  const StampedGrid grid = window.grid();
   ASSERT_EQ(grid.status, TraversabilityStatus::ok) << grid.reason;
   EXPECT_EQ(grid.width, 20U);
   EXPECT_NEAR(grid.origin_map.x(), 2.0, 1e-9);
@@ -370,6 +370,43 @@ TEST_F(TraversabilityThreadTest, TilesThatCannotBeReadAreTriedAgain) {
   clock_.advance(10s);
   EXPECT_TRUE(wait_for(
       [&](const TraversabilityView& view) { return view.tiles.size() == whole.tiles.size(); }));
+}
+
+TEST_F(TraversabilityThreadTest, TheGridIsNeverOfTheMapBefore) {
+  TraversabilityConfig config;
+  config.profiles = {"small"};
+  config.grid_profile = "small";
+  const TraversabilityGridProvider provider(config, "map", latest_map_, snapshot_);
+  start(0s);
+  ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
+  thread_.reset();
+  ASSERT_EQ(provider.grid().status, TraversabilityStatus::ok);
+  MapSnapshot other = world_.view();
+  other.map_id = latest_map_.view()->map_id + 1;
+  latest_map_.begin(shared(other), {});
+  const StampedGrid grid = provider.grid();
+  EXPECT_EQ(grid.status, TraversabilityStatus::not_found);
+  EXPECT_THAT(grid.reason, HasSubstr("another map began"));
+  EXPECT_EQ(provider.message(grid).data().size(), 0U);
+  start(0s);
+  ASSERT_TRUE(wait_for_version(other.version));
+  EXPECT_EQ(provider.grid().status, TraversabilityStatus::ok);
+}
+
+TEST_F(TraversabilityThreadTest, AGridOfTheMapBeforeItsCorrectionHasTheStampOfThen) {
+  TraversabilityConfig config;
+  config.profiles = {"small"};
+  config.grid_profile = "small";
+  const TraversabilityGridProvider provider(config, "map", latest_map_, snapshot_);
+  latest_map_.add_pose({.stamp_ns = 5'000'000'000}, OdometryHealth::good, "");
+  start(0s);
+  ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
+  thread_.reset();
+  latest_map_.add_pose({.stamp_ns = 6'000'000'000}, OdometryHealth::good, "");
+  EXPECT_EQ(provider.grid().stamp_ns, 6'000'000'000);
+  latest_map_.correct(MapCorrection(std::vector{MapCorrection::Pose{.stamp_ns = 0}}),
+                      shared(world_.view()));
+  EXPECT_EQ(provider.grid().stamp_ns, 5'000'000'000);
 }
 
 }  // namespace
