@@ -14,6 +14,9 @@ namespace {
 
 /// Radius of the plane fit [m].
 constexpr double plane_reach_m = 0.5;
+/// No robot's slope explains more across unknown ground: height difference [m] and rise per metre.
+constexpr double unseen_drop_m = 0.25;
+constexpr double unseen_slope = 0.5;
 /// Distance on either side up to which the rise without the step is measured [cells].
 constexpr int rise_cells = 3;
 
@@ -21,7 +24,7 @@ int plane_reach_cells(double cell_m) {
   return std::max(1, static_cast<int>(std::lround(plane_reach_m / cell_m)));
 }
 
-/// Reach of `shape_at`: cells farther away have no influence.
+/// Reach of `shape_at`: known cells farther away have no influence but beyond unknown ones.
 int shape_reach_cells(double cell_m) { return std::max(rise_cells, plane_reach_cells(cell_m)); }
 
 std::optional<double> height_at(const GroundGrid& ground, int x, int y) {
@@ -112,6 +115,25 @@ double step_along(const GroundGrid& ground, int x, int y, std::pair<int, int> d)
   return std::max(0.0, std::abs(difference_m) - std::abs(explained_m));
 }
 
+/// Step between the cell and the first known one beyond unknown ground, to either side.
+double step_beyond_unknown(const GroundGrid& ground, int x, int y, std::pair<int, int> d,
+                           double cell_m) {
+  const double length_m = cell_m * std::hypot(d.first, d.second);
+  const int cells = static_cast<int>(max_filled_gap_m / length_m);
+  double step_m = 0.0;
+  for (const int sign : {-1, 1}) {
+    for (int i = 1; i <= cells; ++i) {
+      const auto beyond_m = height_at(ground, x + sign * i * d.first, y + sign * i * d.second);
+      if (!beyond_m) continue;
+      const double difference_m = std::abs(*beyond_m - ground(x, y).height_m);
+      const bool is_slope = difference_m <= std::max(unseen_drop_m, unseen_slope * i * length_m);
+      if (i > 1 && !is_slope) step_m = std::max(step_m, difference_m);
+      break;
+    }
+  }
+  return step_m;
+}
+
 static_assert(surface_reach_m > max_filled_gap_m + 1.0, "both ends of a gap need their slopes");
 
 /// Objects higher above the ground than this are above every robot [m].
@@ -133,7 +155,9 @@ SurfaceShape shape_at(const GroundGrid& ground, int x, int y, double cell_m) {
   set_plane(plane_around(ground, x, y, cell_m), shape);
   constexpr std::array<std::pair<int, int>, 4> lines{{{1, 0}, {1, 1}, {0, 1}, {-1, 1}}};
   for (const auto& line : lines) {
-    shape.step_m = std::max(shape.step_m, static_cast<float>(step_along(ground, x, y, line)));
+    const double step_m =
+        std::max(step_along(ground, x, y, line), step_beyond_unknown(ground, x, y, line, cell_m));
+    shape.step_m = std::max(shape.step_m, static_cast<float>(step_m));
   }
   return shape;
 }

@@ -16,7 +16,8 @@ struct SurfaceShape {
   float slope = 0.0F;
   /// RMS distance of that ground from the plane [m].
   float roughness_m = 0.0F;
-  /// Largest step between the cell and its neighbours, less the rise that the slope explains [m].
+  /// Largest step between the cell and its neighbours, less the rise that the slope explains, or to
+  /// the ground beyond what is unknown beside it [m].
   float step_m = 0.0F;
 
   friend bool operator==(const SurfaceShape&, const SurfaceShape&) = default;
@@ -25,7 +26,9 @@ struct SurfaceShape {
 /// Shape of the ground at a cell. The plane is fitted to cells of the same class, so that a kerb
 /// beside it is a step and not a slope. A step is the height difference across the cell, from one
 /// side to the other (or to the cell itself where a side has no ground), less the rise that goes on
-/// from cell to cell on either side. @pre the cell's ground is known
+/// from cell to cell on either side. Where ground is unknown beside the cell, the first that is known
+/// within `max_filled_gap_m` counts, as high as it lies, if no robot's slope leads there.
+/// @pre the cell's ground is known
 [[nodiscard]] SurfaceShape shape_at(const GroundGrid& ground, int x, int y, double cell_m);
 
 /// Ground of a cell, independent of the robot.

@@ -244,6 +244,20 @@ TEST(PathBoxes, AreFewForAPathOfManyPositionsAndForOnesOfNoEnd) {
   EXPECT_LE(boxes_along(endless, 10.0).size(), 10'000U);
 }
 
+TEST(PathCheck, ADropBehindUnknownGroundIsInConflictWhereThatMayBeDriven) {
+  RobotProfile robot = square_robot();
+  robot.unknown = UnknownGround::allowed;
+  for (const double gap_m : {0.4, 1.0, 2.0}) {
+    VoxelWorld world;
+    world.ground(-8, -8, 0, 8, road, [](double, double) { return 1.3; });
+    world.ground(gap_m, -8, 8, 8, road);
+    const auto view = traversability_of(world.view(), robot);
+    const PathCheck path = check(*view, {{{-5, 0}, 0}, {{6, 0}, 0}});
+    ASSERT_TRUE(path.conflict) << gap_m;
+    EXPECT_EQ(path.conflict->reason, BlockReason::step);
+  }
+}
+
 }  // namespace
 
 }  // namespace stillmap

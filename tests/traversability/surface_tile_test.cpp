@@ -128,5 +128,27 @@ TEST(SurfaceShape, TheRestOfABlurredEdgeIsNoSlope) {
   EXPECT_GT(largest_step_m(ground), 0.09);
 }
 
+TEST(SurfaceShape, ADropBeyondUnknownGroundIsAStepAtBothItsEnds) {
+  for (const int unknown : {1, 5}) {
+    for (const double rise : {0.0, -0.4}) {
+      GroundGrid ground = ground_of(
+          [&](double x, double) { return rise * x - (x < (unknown + 0.5) * cell_m ? 0.0 : 1.2); });
+      for_each_cell(ground, [&](int x, int y) {
+        if (x > middle && x <= middle + unknown) ground(x, y) = {};
+      });
+      EXPECT_GT(shape_in_the_middle(ground).step_m, 1.1) << unknown;
+      EXPECT_GT(shape_at(ground, middle + unknown + 1, middle, cell_m).step_m, 1.1) << unknown;
+    }
+  }
+}
+
+TEST(SurfaceShape, ASlopeThatGoesOnBeyondUnknownGroundIsNoStep) {
+  GroundGrid ground = ground_of([](double x, double) { return 0.45 * x; });
+  for_each_cell(ground, [&](int x, int y) {
+    if (x > middle && x <= middle + 5) ground(x, y) = {};
+  });
+  EXPECT_LT(shape_in_the_middle(ground).step_m, 0.1);
+}
+
 }  // namespace
 }  // namespace stillmap
