@@ -19,11 +19,22 @@ constexpr double proximity_cost = 80.0;
 /// Cost of ground at the robot's limit of slope or roughness.
 constexpr double effort_cost = 0.5;
 
-/// The lowest object above the robot's obstacle height and below its top.
-const float* blocking_object(std::span<const float> object_heights_m, const RobotProfile& profile) {
-  const auto object =
-      std::ranges::upper_bound(object_heights_m, static_cast<float>(profile.obstacle_height_m()));
-  return object != object_heights_m.end() && *object < profile.height_m ? &*object : nullptr;
+/// Height above the ground from which on an object may hang that was seen at the mean height of a
+/// voxel: its points reach half a cell farther down at most, and not out of the voxel.
+double lower_edge_m(double object_height_m, const GroundCell& ground, double cell_m) {
+  const double mean_map_m = ground.height_m + object_height_m;
+  const double voxel_map_m = cell_m * std::floor(mean_map_m / cell_m);
+  return std::max(mean_map_m - 0.5 * cell_m, voxel_map_m) - ground.height_m;
+}
+
+/// The lowest object above the robot's obstacle height, if it reaches below its top.
+const float* blocking_object(const SurfaceTile::View& surface, const RobotProfile& profile,
+                             double cell_m) {
+  const auto object = std::ranges::upper_bound(surface.object_heights_m,
+                                               static_cast<float>(profile.obstacle_height_m()));
+  if (object == surface.object_heights_m.end()) return nullptr;
+  const bool is_below_top = lower_edge_m(*object, surface.cell->ground, cell_m) < profile.height_m;
+  return is_below_top ? &*object : nullptr;
 }
 
 BlockReason reason_of_ground(const SurfaceCell& cell, const RobotProfile& profile) {
@@ -38,8 +49,9 @@ BlockReason reason_of_ground(const SurfaceCell& cell, const RobotProfile& profil
   return BlockReason::none;
 }
 
-BlockReason reason_of(const SurfaceTile::View& surface, const RobotProfile& profile) {
-  if (const float* object_height_m = blocking_object(surface.object_heights_m, profile)) {
+BlockReason reason_of(const SurfaceTile::View& surface, const RobotProfile& profile,
+                      double cell_m) {
+  if (const float* object_height_m = blocking_object(surface, profile, cell_m)) {
     // An object that begins in the robot's upper half hangs from above.
     return *object_height_m < 0.5 * profile.height_m ? BlockReason::obstacle
                                                      : BlockReason::low_headroom;
@@ -68,11 +80,12 @@ TraversabilityCell make_lethal(TraversabilityCell cell, BlockReason reason, std:
 }
 
 /// Classification of a cell without regard to its neighbours. The clearance is not set.
-TraversabilityCell classify_cell(const SurfaceTile::View& surface, const RobotProfile& profile) {
+TraversabilityCell classify_cell(const SurfaceTile::View& surface, const RobotProfile& profile,
+                                 double cell_m) {
   TraversabilityCell cell;
   if (surface.cell == nullptr) return cell;
   cell.inferred = surface.cell->ground.origin == GroundOrigin::inferred;
-  const BlockReason reason = reason_of(surface, profile);
+  const BlockReason reason = reason_of(surface, profile, cell_m);
   if (reason != BlockReason::none) return make_lethal(cell, reason, lethal_cost);
   if (surface.cell->ground.is_known()) {
     cell.state = CellState::free;
@@ -196,7 +209,7 @@ std::vector<TraversabilityCell> classify_tile(const TileNeighbourhood<SurfaceTil
   CellGrid<TraversabilityCell> classified(window.width(), window.height());
   CellGrid<std::uint8_t> lethal(window.width(), window.height());
   for_each_cell(window, [&](int x, int y) {
-    classified(x, y) = classify_cell(window(x, y), profile);
+    classified(x, y) = classify_cell(window(x, y), profile, cell_m);
     lethal(x, y) = classified(x, y).state == CellState::lethal ? 1 : 0;
   });
   const CellGrid<float> distances =

@@ -115,5 +115,22 @@ TEST(CellClassification, AWallOnUnknownGroundIsAnObstacle) {
   EXPECT_EQ(look(*view, 6.1, 0.1).cell.state, CellState::unknown);
 }
 
+TEST(CellClassification, ABeamIsAsLowAsItsLowestVoxelMayReach) {
+  VoxelWorld world = plain_road();
+  // Means of voxels from 1.6 to 1.8 m: above the ground, 1.5 m, or half a cell below the mean.
+  world.block(-3.0, -3.0, -2.0, -2.0, 1.65, 1.75, building);
+  world.block(2.0, 2.0, 3.0, 3.0, 1.75, 1.85, building);
+  RobotProfile robot = square_robot();
+  const auto low_headroom_for = [&](double height_m, double x_m) {
+    robot.height_m = height_m;
+    return look(*traversability_of(world.view(), robot), x_m, x_m).cell.reason ==
+           BlockReason::low_headroom;
+  };
+  EXPECT_FALSE(low_headroom_for(1.49, -2.5));
+  EXPECT_TRUE(low_headroom_for(1.52, -2.5));
+  EXPECT_FALSE(low_headroom_for(1.54, 2.5));
+  EXPECT_TRUE(low_headroom_for(1.56, 2.5));
+}
+
 }  // namespace
 }  // namespace stillmap
