@@ -7,6 +7,8 @@
 #include <numbers>
 #include <queue>
 
+#include "core/planning/planning_stop.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -26,13 +28,15 @@ constexpr std::array<Step, 8> steps{
 /// A* over squares of cells. A square has the cost of its cheapest cell, so that no gap is closed.
 class Squares {
  public:
-  Squares(const PlanningGrid& grid, int cells)
+  Squares(const PlanningGrid& grid, int cells, const std::function<bool()>& should_stop)
       : grid_(grid),
         cells_(cells),
+        should_stop_(should_stop),
         factors_((grid.width() + cells - 1) / cells, (grid.height() + cells - 1) / cells, blocked),
         costs_(factors_.width(), factors_.height(), blocked),
         from_(factors_.width(), factors_.height(), std::int8_t{-1}) {
     for (int y = 0; y < grid.height(); ++y) {
+      poll();
       for (int x = 0; x < grid.width(); ++x) {
         if (!grid.may_stand_in({x, y})) continue;
         float& factor = factors_(x / cells_, y / cells_);
@@ -54,7 +58,9 @@ class Squares {
     if (factor(start) == blocked || factor(goal) == blocked) return false;
     costs_(start.x, start.y) = 0.0F;
     open_.push({estimate(start, goal), 0.0F, start});
-    while (!open_.empty()) {
+    constexpr std::size_t squares_per_poll = 4096;
+    for (std::size_t i = 0; !open_.empty(); ++i) {
+      if (i % squares_per_poll == 0) poll();
       const Entry entry = open_.top();
       open_.pop();
       if (entry.square == goal) return true;
@@ -76,6 +82,8 @@ class Squares {
   }
 
  private:
+  void poll() const { stop_in("the coarse route was searched", should_stop_); }
+
   struct Entry {
     float total = 0.0F;
     float cost = 0.0F;
@@ -107,6 +115,7 @@ class Squares {
 
   const PlanningGrid& grid_;
   int cells_;
+  const std::function<bool()>& should_stop_;
   CellGrid<float> factors_;
   CellGrid<float> costs_;
   CellGrid<std::int8_t> from_;
@@ -134,9 +143,10 @@ std::vector<PlanarPose> with_headings(const CoarseRoute& route) {
 
 std::optional<CoarseRoute> find_coarse_route(const PlanningGrid& grid,
                                              const Eigen::Vector2d& start_map,
-                                             const Eigen::Vector2d& goal_map) {
+                                             const Eigen::Vector2d& goal_map,
+                                             const std::function<bool()>& should_stop) {
   const int cells = std::max(2, static_cast<int>(std::ceil(min_step_m / grid.cell_m() - 1e-9)));
-  Squares squares(grid, cells);
+  Squares squares(grid, cells, should_stop);
   const CellIndex start = squares.square_of(start_map);
   const CellIndex goal = squares.square_of(goal_map);
   if (!squares.search(start, goal)) return std::nullopt;

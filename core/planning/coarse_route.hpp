@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <random>
 #include <vector>
@@ -22,10 +23,11 @@ struct CoarseRoute {
 };
 
 /// The cheapest route over squares of at least 0.4 m, by A*; nothing if the goal cannot be reached.
+/// Throws PlanningStopped when `should_stop`, which may be empty, is true meanwhile.
 /// @pre both positions are within the grid's bounds
-[[nodiscard]] std::optional<CoarseRoute> find_coarse_route(const PlanningGrid& grid,
-                                                           const Eigen::Vector2d& start_map,
-                                                           const Eigen::Vector2d& goal_map);
+[[nodiscard]] std::optional<CoarseRoute> find_coarse_route(
+    const PlanningGrid& grid, const Eigen::Vector2d& start_map, const Eigen::Vector2d& goal_map,
+    const std::function<bool()>& should_stop = {});
 
 /// Samples poses for the search. Free space is a small part of all poses of a city, so most samples
 /// are drawn around the coarse route with headings along it, some near its ends at any heading

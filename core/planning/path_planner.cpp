@@ -10,6 +10,7 @@
 #include "core/planning/coarse_route.hpp"
 #include "core/planning/path_search.hpp"
 #include "core/planning/path_smoother.hpp"
+#include "core/planning/planning_stop.hpp"
 
 namespace stillmap {
 namespace {
@@ -219,12 +220,13 @@ class Search {
         from_(from),
         to_(to),
         is_whole_map_(box.contains(view.bounds_map())),
-        grid_(view, box, config.cost_weight),
+        grid_(view, box, config.cost_weight, config.should_stop),
         checker_(grid_, config.reverse_factor) {}
 
   [[nodiscard]] PathPlan run(std::span<const PlanarPose> starts,
                              std::span<const PlanarPose> goals) const {
-    const auto route = find_coarse_route(grid_, from_.position_map, to_.position_map);
+    const auto route =
+        find_coarse_route(grid_, from_.position_map, to_.position_map, config_.should_stop);
     if (!route) {
       return failed(view_, PlanStatus::no_path,
                     "no known path from " + text_of(from_.position_map) + " to " +
@@ -310,7 +312,13 @@ PathPlan plan_path(const TraversabilityView& view, const Goal& from, const Goal&
     (void)set_path(view, {{{start.poses.front(), 0.0, false}, 0.0}}, plan);
     return plan;
   }
-  return Search(view, from, to, *search_box(view, from, to), config).run(start.poses, goal.poses);
+  try {
+    return Search(view, from, to, *search_box(view, from, to), config).run(start.poses, goal.poses);
+  } catch (const PlanningStopped& stopped) {
+    return failed(view, PlanStatus::out_of_time,
+                  std::string("stopped while ") + stopped.what() + ", before any path to " +
+                      text_of(to.position_map) + " was looked for; allow more time");
+  }
 }
 
 std::string_view name(PlannerKind kind) {

@@ -38,7 +38,7 @@ struct PlanningConfig {
   /// Equal map, request, configuration and seed give the same path, unless `should_stop` ended the
   /// search.
   std::uint32_t seed = 1;
-  /// Polled; when true, the best path so far is returned. May be empty.
+  /// Polled in all stages; when true, the best path so far is returned, if any. May be empty.
   std::function<bool()> should_stop;
   /// Called with the cost of every better path. May be empty.
   std::function<void(double)> improved;
@@ -65,7 +65,7 @@ enum class PlanStatus : std::uint8_t {
   /// No path over known ground is wide enough; more steps would not help.
   no_path,
   /// The search ended before it found a path; there may be one. `poses` lead to the nearest pose
-  /// reached.
+  /// reached, if any was before the stage that `reason` names.
   out_of_time,
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/planning/planning_stop.hpp"
 #include "core/traversability/cell_grid.hpp"
 
 namespace stillmap {
@@ -46,7 +47,7 @@ double PlanningGrid::cells_for(const Eigen::AlignedBox2d& box_map, double cell_m
 }
 
 PlanningGrid::PlanningGrid(const TraversabilityView& view, const Eigen::AlignedBox2d& box_map,
-                           double cost_weight)
+                           double cost_weight, const std::function<bool()>& should_stop)
     : cell_m_(view.cell_m), profile_(view.profile), bounds_map_(box_map) {
   const int margin =
       2 + static_cast<int>(std::ceil(profile_.circumscribed_radius_m() / cell_m_ + half_diagonal));
@@ -60,7 +61,9 @@ PlanningGrid::PlanningGrid(const TraversabilityView& view, const Eigen::AlignedB
   CellGrid<std::uint8_t> closed(columns, rows, is_closed(unknown, profile_.unknown) ? 1 : 0);
   factors_ =
       CellGrid<float>(columns, rows, static_cast<float>(1.0 + cost_weight * cost_of(unknown)));
+  const auto poll = [&] { stop_in("the grid of the map's cells was made", should_stop); };
   for (const auto& tile : view.tiles) {
+    poll();
     visit_shared(*tile, origin_, closed, [&](int x, int y, const TraversabilityCell& cell) {
       closed(x, y) = is_closed(cell, profile_.unknown) ? 1 : 0;
       factors_(x, y) = static_cast<float>(1.0 + cost_weight * cost_of(cell));
@@ -79,7 +82,7 @@ PlanningGrid::PlanningGrid(const TraversabilityView& view, const Eigen::AlignedB
   disc_radius_m_ =
       std::hypot(0.5 * piece_m, 0.5 * profile_.width_m) + 2.0 * half_diagonal * cell_m_;
   // Larger distances are never compared: the discs are no smaller than the inscribed circle.
-  distances_m_ = distances_to_marked(closed, disc_radius_m_ / cell_m_ + 1.0);
+  distances_m_ = distances_to_marked(closed, disc_radius_m_ / cell_m_ + 1.0, poll);
   for_each_cell(closed, [&](int x, int y) {
     distances_m_(x, y) = static_cast<float>(cell_m_ * distances_m_(x, y));
   });

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -15,10 +16,11 @@ namespace stillmap {
 class PlanningGrid {
  public:
   /// Covers the box (map frame [m], not empty) and a margin of a footprint on every side. The cost
-  /// of a metre is 1 + `cost_weight` * the cell's cost, 0 to 1.
+  /// of a metre is 1 + `cost_weight` * the cell's cost, 0 to 1. Throws PlanningStopped when
+  /// `should_stop`, which may be empty, is true meanwhile.
   /// @pre cells_for(box_map, view.cell_m) <= max_cells
   PlanningGrid(const TraversabilityView& view, const Eigen::AlignedBox2d& box_map,
-               double cost_weight);
+               double cost_weight, const std::function<bool()>& should_stop = {});
 
   static constexpr double max_cells = 50e6;
   [[nodiscard]] static double cells_for(const Eigen::AlignedBox2d& box_map, double cell_m);

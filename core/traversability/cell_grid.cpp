@@ -6,7 +6,8 @@
 
 namespace stillmap {
 
-CellGrid<float> distances_to_marked(const CellGrid<std::uint8_t>& marked, double max_distance) {
+CellGrid<float> distances_to_marked(const CellGrid<std::uint8_t>& marked, double max_distance,
+                                    const std::function<void()>& each_block) {
   assert(max_distance > 0.0 && max_distance <= 1024.0);
   CellGrid<float> distances(marked.width(), marked.height());
   if (marked.cells().empty()) return distances;
@@ -23,6 +24,7 @@ CellGrid<float> distances_to_marked(const CellGrid<std::uint8_t>& marked, double
   const cv::Rect grid(0, 0, open.cols, open.rows);
   for (int y = 0; y < grid.height; y += block_cells) {
     for (int x = 0; x < grid.width; x += block_cells) {
+      if (each_block) each_block();
       const cv::Rect block = cv::Rect(x, y, block_cells, block_cells) & grid;
       const cv::Rect wide = cv::Rect(block.tl() - cv::Point(overlap, overlap),
                                      block.size() + cv::Size(2 * overlap, 2 * overlap)) &

@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -51,9 +52,11 @@ void for_each_cell(const CellGrid<T>& grid, const Visit& visit) {
 
 /// Distance from every cell's centre to that of the nearest marked cell [cells]: exact to float
 /// precision up to `max_distance`, which is also the value of all cells farther away. A mark is any
-/// value but 0. @pre 0 < max_distance <= 1024
+/// value but 0. `each_block` is called before each million cells, and may throw. @pre 0 <
+/// max_distance <= 1024
 [[nodiscard]] CellGrid<float> distances_to_marked(const CellGrid<std::uint8_t>& marked,
-                                                  double max_distance);
+                                                  double max_distance,
+                                                  const std::function<void()>& each_block = {});
 
 /// A tile and its eight neighbours; null where there is no tile. `TileT` has `side` columns and
 /// rows and `at(x, y)`.

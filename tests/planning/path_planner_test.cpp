@@ -234,5 +234,29 @@ TEST(PathPlanner, APathThatIsTooLongForOneCheckIsFound) {
   EXPECT_EQ(check_path(view, plan.path_map()).status, TraversabilityStatus::too_large);
 }
 
+TEST(PathPlanner, IsStoppedInEveryStageAndNamesIt) {
+  const TraversabilityView view = free_ground(square_robot(), 0.2, 30, 30);
+  std::uint64_t polls = 0;
+  const auto plan_until = [&](std::uint64_t last) {
+    PlanningConfig config;
+    config.smoothing_attempts = 10;
+    config.should_stop = [&, last] { return ++polls > last; };
+    polls = 0;
+    return plan_path(view, {{5, 5}, 0.0}, {{590, 590}, 0.0}, config);
+  };
+  ASSERT_TRUE(plan_until(10'000'000).is_found());
+  for (const auto& [last, stage] : {std::pair{1, "grid of the map's cells"},
+                                    {899, "grid of the map's cells"},
+                                    {905, "grid of the map's cells"},
+                                    {1000, "coarse route"},
+                                    {3900, "coarse route"}}) {
+    const PathPlan plan = plan_until(static_cast<std::uint64_t>(last));
+    EXPECT_EQ(plan.status, PlanStatus::out_of_time) << last;
+    EXPECT_THAT(plan.reason, HasSubstr(stage)) << last;
+    EXPECT_LE(polls, static_cast<std::uint64_t>(last) + 1);
+    EXPECT_TRUE(plan.poses.empty());
+  }
+}
+
 }  // namespace
 }  // namespace stillmap
