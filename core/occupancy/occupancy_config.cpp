@@ -14,7 +14,8 @@ std::string outside(const char* field, double value, double low, double high, co
 }  // namespace
 
 std::string OccupancyConfig::faults() const {
-  std::string text = outside("resolution_m", resolution_m, 0.02, 10.0, " m");
+  std::string text =
+      outside("resolution_m", resolution_m, min_resolution_m, max_resolution_m, " m");
   text += outside("max_range_m", max_range_m, 1.0, 300.0, " m");
   text += outside("clearing_range_m", clearing_range_m, 0.0, 300.0, " m");
   text += outside("clearing_interval", clearing_interval, 1.0, 1000.0, "");

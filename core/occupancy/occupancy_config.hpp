@@ -10,6 +10,9 @@ namespace stillmap {
 struct OccupancyConfig {
   /// Edge of the smallest voxel. The map extends 32768 voxels from its origin in every direction.
   double resolution_m = 0.2;
+  /// Of maps that are made here; files of other programs are read as they are.
+  static constexpr double min_resolution_m = 0.02;
+  static constexpr double max_resolution_m = 10.0;
   /// Points beyond this range do not mark voxels as occupied.
   double max_range_m = 60.0;
   /// Rays mark the voxels that they traverse as free up to this range; 0 disables clearing.

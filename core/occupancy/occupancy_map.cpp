@@ -61,6 +61,7 @@ const OccupancyConfig& checked(const OccupancyConfig& config) {
   return config;
 }
 
+/// Its resolution may be one that no map here is made with.
 OccupancyConfig config_of(const OctomapData& data) {
   if (const OctomapCheck check = check_octomap(data); !check.fault.empty()) {
     throw std::invalid_argument("octomap data is damaged: " + check.fault);
@@ -100,7 +101,8 @@ bool is_evicted(const ColumnTiles& tiles) {
 OccupancyMap::OccupancyMap(const OccupancyConfig& config)
     : state_(std::make_unique<State>(checked(config))) {}
 
-OccupancyMap::OccupancyMap(const OctomapData& data) : OccupancyMap(config_of(data)) {
+OccupancyMap::OccupancyMap(const OctomapData& data)
+    : state_(std::make_unique<State>(config_of(data))) {
   if (data.bytes.empty()) return;
   std::istringstream in(data.bytes);
   data.binary ? state_->octree.readBinaryData(in) : state_->octree.readData(in);

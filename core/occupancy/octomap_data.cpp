@@ -3,6 +3,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <sstream>
 
 namespace stillmap {
 namespace {
@@ -78,6 +79,16 @@ class EncodingWalk {
 
 }  // namespace
 
-OctomapCheck check_octomap(const OctomapData& data) { return EncodingWalk(data).check(); }
+OctomapCheck check_octomap(const OctomapData& data) {
+  // Of what the octree's 2^16 voxels a side can be counted in.
+  constexpr double finest_m = 1e-6;
+  constexpr double coarsest_m = 1e6;
+  if (data.resolution_m >= finest_m && data.resolution_m <= coarsest_m)
+    return EncodingWalk(data).check();
+  std::ostringstream fault;
+  fault << "a resolution of " << data.resolution_m << " m; it must be " << finest_m << " to "
+        << coarsest_m;
+  return {.nodes = 0, .fault = fault.str()};
+}
 
 }  // namespace stillmap

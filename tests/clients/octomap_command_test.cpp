@@ -57,6 +57,8 @@ TEST_F(OctomapCommandTest, RefusesWhatItCannotUse) {
   EXPECT_THAT(refusal(map + " --output " + path("no/map.bt")), HasSubstr("cannot be written"));
   EXPECT_THAT(refusal(map + " --point 1,2"), HasSubstr("--point has 2 numbers"));
   EXPECT_THAT(refusal(map + " --resolution 0"), HasSubstr("--resolution"));
+  EXPECT_THAT(refusal(map + " --resolution 0.01"),
+              HasSubstr("--resolution is 0.010; it must be 0.02 to 10 m"));
   write("broken.bt", "# Octomap OcTree binary file\nid OcTree\nsize 9\nres 0.2\ndata\nxx");
   EXPECT_THAT(refusal("--map " + path("broken.bt")),
               AllOf(HasSubstr("broken.bt"), HasSubstr("damaged")));

@@ -143,5 +143,23 @@ TEST(OctomapFileThatCannotBe, IsNamed) {
               HasSubstr("cannot be written"));
 }
 
+TEST_P(OctomapFile, OfOtherProgramsIsReadWhateverItsResolution) {
+  for (const double resolution_m : {0.01, 25.0}) {
+    octomap::OcTree tree(resolution_m);
+    tree.updateNode(octomap::point3d(0.0F, 0.0F, 0.0F), true);
+    is_binary() ? tree.writeBinary(file().string()) : tree.write(file().string());
+    const OccupancyMap map(read_octomap_file(file()));
+    EXPECT_EQ(map.resolution_m(), resolution_m);
+    const Eigen::Vector3d p_map = Eigen::Vector3d::Constant(0.5 * resolution_m);
+    EXPECT_EQ(map.at_point(p_map).occupancy, Occupancy::occupied);
+  }
+  // What would be no resolution is still refused, by the file's name.
+  OctomapData none = map_.encode(is_binary());
+  none.resolution_m = 1e-300;
+  write_octomap_file(file(), none);
+  EXPECT_THAT(message_of<MapFileError>([&] { static_cast<void>(read_octomap_file(file())); }),
+              HasSubstr(std::string(GetParam()) + ": is damaged: a resolution of"));
+}
+
 }  // namespace
 }  // namespace stillmap::test

@@ -218,6 +218,11 @@ OccupancyMap open_map(const OctomapArguments& arguments) {
   }
   OccupancyConfig config;
   if (arguments.resolution_m != 0.0) config.resolution_m = arguments.resolution_m;
+  if (!config.faults().empty()) {
+    throw std::invalid_argument("--resolution is " + fixed(config.resolution_m, 3) +
+                                "; it must be " + fixed(OccupancyConfig::min_resolution_m, 2) +
+                                " to " + fixed(OccupancyConfig::max_resolution_m, 0) + " m");
+  }
   OccupancyMap map(config);
   const SavedMap saved = read_map_file(file);
   if (const std::size_t left_out = map.insert(saved.view); left_out > 0) {
