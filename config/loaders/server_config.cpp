@@ -11,9 +11,9 @@
 #include "config/loaders/listening_address.hpp"
 #include "config/loaders/mapper_section.hpp"
 #include "config/loaders/named_file.hpp"
-#include "config/loaders/robot_profile.hpp"
 #include "config/loaders/sensor_file.hpp"
 #include "config/loaders/topic_name.hpp"
+#include "config/loaders/traversability_section.hpp"
 #include "config/loaders/yaml_section.hpp"
 #include "core/frames/rigid_motion.hpp"
 #include "core/geodesy/datum.hpp"
@@ -286,24 +286,6 @@ void read_occupancy(YamlSection section, OccupancyServiceConfig& occupancy) {
   section.number("publish_period_s", occupancy.publish_period_s, periods_s);
 }
 
-void read_traversability(YamlSection section, const fs::path& folder,
-                         TraversabilityConfig& config) {
-  section.text_list("profiles", config.profiles);
-  section.number("update_period_s", config.update_period_s, periods_s);
-  section.text("grid_profile", config.grid_profile);
-  section.number("grid_window_m", config.grid_window_m, {0, 100'000});
-  for (std::string& profile : config.profiles) profile = robot_from(folder, profile);
-  try {
-    const std::vector<RobotProfile> robots = load_robots(config);
-    if (config.grid_profile.empty() || robots.empty()) return;
-    if (std::ranges::find(robots, config.grid_profile, &RobotProfile::name) != robots.end()) return;
-    section.fault("grid_profile", "'" + config.grid_profile +
-                                      "' is not one of traversability.profiles; empty: no grid");
-  } catch (const ConfigError& error) {
-    for (const std::string& fault : error.faults()) section.fault("profiles", fault);
-  }
-}
-
 LidarConfig read_lidar(YamlSection& section, const fs::path& folder) {
   LidarConfig lidar;
   section.require({"name", "sensor", "topic"});
@@ -418,30 +400,13 @@ void read_server(YamlSection file, const fs::path& folder, ServerConfig& config)
   if (!config.topics.gnss.empty() && !config.map.close_loops)
     file.fault("topics", "gnss corrects the map: it needs map.close_loops");
   read_occupancy(file.section("occupancy"), config.occupancy);
-  read_traversability(file.section("traversability"), folder, config.traversability);
+  read_traversability(file.section("traversability"), folder, config.mapper.static_map.tile_size_m,
+                      config.traversability);
   read_log(file.section("log"), config.log);
   read_metrics(file.section("metrics"), config.metrics);
 }
 
 }  // namespace
-
-std::vector<RobotProfile> load_robots(const TraversabilityConfig& config) {
-  std::vector<RobotProfile> robots;
-  std::vector<std::string> faults;
-  for (const std::string& profile : config.profiles) {
-    try {
-      RobotProfile robot = load_robot_profile(profile);
-      if (std::ranges::find(robots, robot.name, &RobotProfile::name) != robots.end()) {
-        faults.push_back("two robots are called '" + robot.name + "'; clients ask by name");
-      }
-      robots.push_back(std::move(robot));
-    } catch (const ConfigError& error) {
-      faults.insert(faults.end(), error.faults().begin(), error.faults().end());
-    }
-  }
-  if (!faults.empty()) throw ConfigError(faults);
-  return robots;
-}
 
 ServerConfig load_server_config(const fs::path& file) {
   ConfigReport report;

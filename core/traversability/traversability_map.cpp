@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -171,6 +172,10 @@ struct TraversabilityMap::State {
 /// Drops all tiles if the map has another id or another size of tiles or voxels.
 void TraversabilityMap::State::set_map(const MapSnapshot& map) {
   const int new_side = map.tiles.empty() ? 0 : checked_side(map);
+  for (const RobotProfile& profile : profiles) {
+    const std::string fault = new_side > 0 ? tile_size_fault(profile, map.tile_size_m) : "";
+    if (!fault.empty()) throw std::invalid_argument(fault);
+  }
   const bool is_same = map.map_id == map_id && map.tile_size_m == tile_size_m &&
                        map.voxel_size_m == cell_m && new_side == side;
   if (!is_same) tiles.clear();
@@ -297,6 +302,16 @@ void TraversabilityMap::State::publish() {
     for (const auto& [id, state] : tiles) view->tiles.push_back(state.classified[i]);
     views[i] = std::move(view);
   }
+}
+
+std::string tile_size_fault(const RobotProfile& profile, double tile_size_m) {
+  if (profile.inscribed_radius_m() <= tile_size_m) return {};
+  std::ostringstream fault;
+  fault << "robot profile '" << profile.name << "' has an inscribed circle of "
+        << profile.inscribed_radius_m()
+        << " m, which is more than static_map.tile_size_m = " << tile_size_m
+        << ": make a map of larger tiles, or leave the profile out";
+  return fault.str();
 }
 
 TraversabilityMap::TraversabilityMap(std::vector<RobotProfile> profiles)

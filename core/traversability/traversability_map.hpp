@@ -24,6 +24,10 @@ struct TraversabilityUpdate {
   std::size_t classified = 0;
 };
 
+/// Why a robot cannot be classified in tiles of so many metres: what is lethal in a tile reaches
+/// into those beside it, and no farther. Empty where it can.
+[[nodiscard]] std::string tile_size_fault(const RobotProfile& profile, double tile_size_m);
+
 /// Traversability of a growing map for several robots, which share the surface. An update processes
 /// the tiles that changed and those that they influence; its result is bitwise that of a new object
 /// for the same map. NOT thread-safe; views are immutable.
@@ -38,7 +42,7 @@ class TraversabilityMap {
   /// Updates all profiles to this snapshot. Non-resident tiles that changed are read through
   /// `tiles`, without which there must be none; one that cannot be read stays as it was, and is
   /// tried again by the next update. Throws std::invalid_argument if a tile's side is not a whole
-  /// number of voxels.
+  /// number of voxels, and with tile_size_fault.
   TraversabilityUpdate update(const MapSnapshot& map, const ThrottleCallback& throttle = {},
                               TileReader* tiles = nullptr);
 

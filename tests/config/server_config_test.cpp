@@ -371,5 +371,13 @@ TEST(ServerConfig, RefusesFramesThatBeginWithASlash) {
               HasSubstr("sensors[0].frame: '/velodyne' begins with '/'"));
 }
 
+TEST(ServerConfig, RefusesRobotsThatAreLargerThanTiles) {
+  EXPECT_THAT(refusal_of("static_map: {voxel_size_m: 0.2, tile_size_m: 0.8}\n"
+                         "traversability: {profiles: [car, delivery_robot]}"),
+              AllOf(HasSubstr("server.yaml:2: traversability.profiles"), HasSubstr("'car'"),
+                    HasSubstr("0.95 m"), HasSubstr("static_map.tile_size_m = 0.8"),
+                    Not(HasSubstr("'delivery"))));
+}
+
 }  // namespace
 }  // namespace stillmap

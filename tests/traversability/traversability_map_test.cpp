@@ -215,5 +215,20 @@ TEST(TraversabilityMap, HasNoViewOfAProfileItDoesNotKnow) {
   EXPECT_EQ(TraversabilityMap({square_robot()}).view("round"), nullptr);
 }
 
+TEST(TraversabilityMap, RefusesARobotThatIsLargerThanTiles) {
+  RobotProfile robot = square_robot();
+  robot.length_m = robot.width_m = 2.2;
+  VoxelWorld world(5);
+  world.ground(-4, -4, 4, 4, road);
+  robot.name = "wide";
+  TraversabilityMap of_wide({square_robot(), robot});
+  EXPECT_THAT(
+      [&] { (void)of_wide.update(world.view()); },
+      testing::ThrowsMessage<std::invalid_argument>(testing::AllOf(
+          HasSubstr("'wide'"), HasSubstr("1.1 m"), HasSubstr("static_map.tile_size_m = 1"))));
+  robot.length_m = robot.width_m = 2.0;
+  EXPECT_NO_THROW((void)TraversabilityMap({robot}).update(world.view()));
+}
+
 }  // namespace
 }  // namespace stillmap
