@@ -125,9 +125,11 @@ std::optional<FittedSurface> fit_surface(const Neighbours& neighbours, double mi
 }
 
 FittedSurface weighed_ring_line(const FittedSurface& line, const Eigen::Vector3d& point_lidar,
-                                const Eigen::Matrix3d& R_map_lidar, double across_rings_weight) {
+                                const Eigen::Matrix3d& R_map_lidar,
+                                const RingLineWeights& weights) {
   const double level_m = point_lidar.head<2>().norm();
-  if (line.normal_count != 2 || across_rings_weight == 1.0 || !(level_m > 0.0)) return line;
+  const bool count_fully = weights.along_ray == 1.0 && weights.across_rings == 1.0;
+  if (line.normal_count != 2 || count_fully || !(level_m > 0.0)) return line;
   // Where the next ring would meet a surface that faces the lidar.
   const Eigen::Vector3d across_lidar(-point_lidar.x() * point_lidar.z() / level_m,
                                      -point_lidar.y() * point_lidar.z() / level_m, level_m);
@@ -138,7 +140,7 @@ FittedSurface weighed_ring_line(const FittedSurface& line, const Eigen::Vector3d
   return {line.centre_map,
           {along_ray_map, along_map.cross(along_ray_map)},
           2,
-          {1.0, across_rings_weight}};
+          {weights.along_ray, weights.across_rings}};
 }
 
 double extrapolation(const FittedSurface& plane, const Neighbours& neighbours,

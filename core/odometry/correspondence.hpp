@@ -37,14 +37,21 @@ struct FittedSurface {
 [[nodiscard]] std::optional<FittedSurface> fit_surface(
     const Neighbours& neighbours, double min_plane_width = RegistrationConfig{}.min_plane_width);
 
+/// What the distances from a line along the lidar's rings count, 0..1.
+struct RingLineWeights {
+  double along_ray = 1.0;
+  double across_rings = 1.0;
+};
+
 /// A line as a lidar sees it that turns about its z axis, from a point of its scan. One that runs
 /// along the lidar's rings may be no edge: any wall shows such lines, which rise or fall as the
-/// lidar comes nearer, and take it along. Of such a line the distance across the rings counts
-/// `across_rings_weight`, that along the ray 1; one that crosses the rings stays as it is.
+/// lidar comes nearer, and take it along. Of such a line the distances along the ray and across the
+/// rings count as `weights` says; one that crosses the rings stays as it is, and so does any where
+/// both count 1.
 [[nodiscard]] FittedSurface weighed_ring_line(const FittedSurface& line,
                                               const Eigen::Vector3d& point_lidar,
                                               const Eigen::Matrix3d& R_map_lidar,
-                                              double across_rings_weight);
+                                              const RingLineWeights& weights);
 
 /// How far a point lies from the middle of the neighbours of its plane, along the plane, in
 /// standard deviations of theirs (Mahalanobis distance).

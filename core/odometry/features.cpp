@@ -269,6 +269,10 @@ Features extract_surfaces(const Scan& scan, const FeatureConfig& config) {
   features.planes = voxel_downsample(scan.points_lidar, all, config.map_surface_spacing_m);
   features.surfaces =
       voxel_downsample(scan.points_lidar, features.planes, config.surface_spacing_m);
+  const ColumnHeights columns(scan.points_lidar, features.planes);
+  features.is_level.resize(scan.size());
+  for (const std::uint32_t i : features.surfaces)
+    features.is_level[i] = !columns.stands_up(scan.points_lidar[i]);
   const bool are_points_spaced = config.surface_spacing_m == map_point_spacing_m;
   pick_points(scan,
               are_points_spaced

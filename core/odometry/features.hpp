@@ -21,6 +21,8 @@ struct Features {
   std::vector<std::uint32_t> registered_planes;
   /// Points of a scan without rings that are registered: the local map says what they lie on.
   std::vector<std::uint32_t> surfaces;
+  /// Of every point of the scan, where it has surfaces: it is one, and on level ground.
+  std::vector<bool> is_level;
   /// Points of any kind, spread evenly: inserted into the local map for the alignment of points.
   std::vector<std::uint32_t> points;
   /// Those of `points` that are aligned: on something that stands up, and on level ground.

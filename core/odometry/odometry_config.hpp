@@ -119,9 +119,9 @@ struct RegistrationConfig {
   double max_extrapolation = 1.5;
   /// Fewer correspondences than this give no pose.
   int min_correspondences = 50;
-  /// A direction is degenerate when one metre (or radian, times the scan's mean range) along it
-  /// changes the mean squared residual by less than this share.
-  double min_observability = 0.005;
+  /// A direction is degenerate when one metre along it (or a turn that moves points by one metre on
+  /// average) changes the mean squared residual by less than this share.
+  double min_observability = 0.002;
 };
 
 /// What moves (paper II-C.2, and earlier range images).

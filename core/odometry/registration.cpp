@@ -56,6 +56,13 @@ bool move_to(const OdometryResult& pose, const FeaturePoint& feature, Correspond
   return true;
 }
 
+/// On level ground a ring lies where the lidar stands, wherever that is: along the ray it says that
+/// the lidar did not move.
+RingLineWeights ring_line_weights(const FeaturePoint& feature, const RegistrationConfig& config) {
+  const bool counts_nothing = feature.is_level && config.across_rings_weight < 1.0;
+  return {counts_nothing ? 0.0 : 1.0, config.across_rings_weight};
+}
+
 void look_up(const FeaturePoint& feature, FeatureKind kind, const FeatureMap& map,
              const RegistrationConfig& config, const Eigen::Matrix3d& R_map_lidar,
              Correspondence& found) {
@@ -67,8 +74,8 @@ void look_up(const FeaturePoint& feature, FeatureKind kind, const FeatureMap& ma
   if (!surface) return;
   const double thin_m2 = config.plane_deviation_m * config.plane_deviation_m;
   found.thinness = thin_m2 > 0.0 ? thin_m2 / (thin_m2 + surface->variance_m2) : 1.0;
-  found.surface =
-      weighed_ring_line(*surface, found.point_lidar, R_map_lidar, config.across_rings_weight);
+  found.surface = weighed_ring_line(*surface, found.point_lidar, R_map_lidar,
+                                    ring_line_weights(feature, config));
   if (config.max_extrapolation > 0.0 && surface->normal_count == 1 &&
       extrapolation(*surface, neighbours, found.searched_map.cast<double>()) >
           config.max_extrapolation) {
@@ -170,8 +177,12 @@ NormalEquations build_normal_equations(std::span<const Correspondence> correspon
       equations.hessian_sweep(bend_of_sweep, bend_of_sweep) += w_k * bend_slope * bend_slope;
       equations.gradient_sweep[bend_of_sweep] += pull * bend_slope;
     }
-    equations.weights += w * c.surface.weights[0];
-    equations.squared_ranges += w * c.surface.weights[0] * c.point_lidar.squaredNorm();
+    const double w_surface =
+        w * *std::max_element(c.surface.weights.begin(), c.surface.weights.begin() + r.count);
+    const Eigen::Vector3d arm_map = T_map_lidar.linear() * c.point_lidar;
+    equations.weights += w_surface;
+    equations.arms += w_surface * (arm_map.squaredNorm() * Eigen::Matrix3d::Identity() -
+                                   arm_map * arm_map.transpose());
     (i < edge_count ? equations.edges : equations.planes) += 1;
   }
   equations.hessian = hessian.matrix();
@@ -182,29 +193,43 @@ NormalEquations build_normal_equations(std::span<const Correspondence> correspon
   return equations;
 }
 
-/// The pose error along the eigenvectors of J'WJ. Rotation is scaled by the mean range, so that one
-/// unit of it moves points as far as one metre does, and an eigenvalue per unit of weight is the
-/// share of residuals that see the direction.
+/// Along a tunnel the noise of its walls' normals looks like so large a share of residuals that see
+/// the way: it is followed, and no pose is good by it.
+constexpr double min_shift_observability = 0.01;
+
+/// The pose error along the eigenvectors of J'WJ. Rotation is scaled by the points' mean arm about
+/// each axis, so that one unit of it moves points as far as one metre does, and an eigenvalue per
+/// unit of weight is the share of residuals that see the direction. Of an aisle's points far ahead
+/// the arm of a roll is the aisle's width, not their range.
 class ErrorDirections {
  public:
   ErrorDirections(const NormalEquations& equations, double min_observability)
       : equations_(equations), min_observability_(min_observability) {
-    const double mean_range =
-        std::max(1.0, std::sqrt(equations.squared_ranges / equations.weights));
-    scale_ << 1.0, 1.0, 1.0, 1.0 / mean_range, 1.0 / mean_range, 1.0 / mean_range;
-    eigen_.compute(scale_.asDiagonal() * equations.hessian * scale_.asDiagonal() /
-                   equations.weights);
+    constexpr double min_squared_arm_m2 = 1.0;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> arms(equations.arms / equations.weights);
+    const Eigen::Vector3d squared_arms_m2 = arms.eigenvalues().cwiseMax(min_squared_arm_m2);
+    scale_.bottomRightCorner<3, 3>() = arms.eigenvectors() *
+                                       squared_arms_m2.cwiseSqrt().cwiseInverse().asDiagonal() *
+                                       arms.eigenvectors().transpose();
+    eigen_.compute(scale_ * equations.hessian * scale_ / equations.weights);
   }
 
-  /// Whether the scan observes all of them.
-  [[nodiscard]] bool are_observed() const { return observes(0); }
+  /// Whether the scan observes all of them, and shifts by more than the noise of normals looks
+  /// like.
+  [[nodiscard]] bool are_clear() const {
+    for (int k = 0; k < 6; ++k) {
+      const double shift = eigen_.eigenvectors().col(k).head<3>().squaredNorm();
+      if (!observes(k) || eigen_.eigenvalues()[k] < shift * min_shift_observability) return false;
+    }
+    return true;
+  }
 
   /// Gauss-Newton step, without the directions that the scan does not observe.
   [[nodiscard]] PoseTangent step() const {
-    const PoseTangent gradient = scale_.asDiagonal() * equations_.gradient / equations_.weights;
+    const PoseTangent gradient = scale_ * equations_.gradient / equations_.weights;
     PoseTangent along = eigen_.eigenvectors().transpose() * gradient;
     for (int k = 0; k < 6; ++k) along[k] *= observes(k) ? -1.0 / eigen_.eigenvalues()[k] : 0.0;
-    return scale_.asDiagonal() * (eigen_.eigenvectors() * along);
+    return scale_ * (eigen_.eigenvectors() * along);
   }
 
   /// Variance of the weighted residuals times (J'WJ)^-1. Directions that are not observed, in which
@@ -219,17 +244,16 @@ class ErrorDirections {
           observes(k) ? eigen_.eigenvalues()[k] * equations_.weights / variance : 0.0;
       deviation[k] = 1.0 / std::sqrt(1.0 + information);
     }
-    const Matrix6d root = scale_.asDiagonal() * eigen_.eigenvectors() * deviation.asDiagonal();
+    const Matrix6d root = scale_ * eigen_.eigenvectors() * deviation.asDiagonal();
     return root * root.transpose();
   }
 
  private:
-  /// Eigenvalues come in rising order.
   [[nodiscard]] bool observes(int k) const { return eigen_.eigenvalues()[k] > min_observability_; }
 
   const NormalEquations& equations_;
   double min_observability_;
-  PoseTangent scale_;
+  Matrix6d scale_ = Matrix6d::Identity();
   Eigen::SelfAdjointEigenSolver<Matrix6d> eigen_;
 };
 
@@ -267,7 +291,7 @@ bool take_step(const SweepPrior* sweep_prior, const RegistrationConfig& limits,
   result.T_map_lidar = boxplus(result.T_map_lidar, step);
   result.converged = is_small(step, 1.0, limits) && is_small(sweep_step, 2.0, limits) &&
                      std::abs(bend_step_rad) < 4.0 * limits.step_rotation_rad;
-  return !directions.are_observed();
+  return !directions.are_clear();
 }
 
 /// What the last iteration says of how well the scan lies on the map.

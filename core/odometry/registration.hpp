@@ -19,6 +19,8 @@ struct FeaturePoint {
   float confidence = 1.0F;
   /// When the point was measured: -0.5 at the sweep's start, 0.5 at its end; 0 where unknown.
   float sweep_part = 0.0F;
+  /// On level ground, as far as its scan tells.
+  bool is_level = false;
 };
 
 /// What the motion within a sweep is expected to be: the motion since the last pose, scaled to the

@@ -66,6 +66,7 @@ class FeaturePoints {
       point.confidence = std::min(std::max(0.0F, parts_.labels.confidence[i]), 1.0F);
     if (rolling())
       point.sweep_part = static_cast<float>(parts_.sweep.part(parts_.scan.time_offset_s[i]));
+    if (!parts_.features.is_level.empty()) point.is_level = parts_.features.is_level[i];
     return point;
   }
   /// Those of `indices` for which `is_used(i)` holds.

@@ -23,7 +23,8 @@ struct NormalEquations {
   SweepTangent gradient_sweep = SweepTangent::Zero();
   double weighted_squares = 0.0;
   double weights = 0.0;
-  double squared_ranges = 0.0;
+  /// Sum of w (|p|^2 I - p p') over the points' arms p from the lidar, along the map's axes [m^2].
+  Eigen::Matrix3d arms = Eigen::Matrix3d::Zero();
   /// Sum of the features' scores (OdometryResult::fit), and of those that lie on no level plane.
   double scores = 0.0;
   double upright_scores = 0.0;

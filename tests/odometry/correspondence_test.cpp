@@ -277,7 +277,7 @@ TEST(RingLine, CountsLittleAcrossTheRings) {
       const FittedSurface line =
           line_through(T_map_lidar * ring.point_lidar, T_map_lidar.linear() * ring.along_lidar);
       const FittedSurface left =
-          weighed_ring_line(line, ring.point_lidar, T_map_lidar.linear(), 0.25);
+          weighed_ring_line(line, ring.point_lidar, T_map_lidar.linear(), {1.0, 0.25});
       ASSERT_EQ(left.normal_count, 2U);
       EXPECT_EQ(left.weights, (std::array{1.0, 0.25}));
       // The distance to the line is the same.
@@ -296,13 +296,21 @@ TEST(RingLine, CountsLittleAcrossTheRings) {
   }
 }
 
+TEST(RingLine, MayCountNothingAlongTheRay) {
+  const RingOnWall ring = ring_on_wall(12.0, 0.3, -0.1);
+  const FittedSurface line = line_through(ring.point_lidar, ring.along_lidar);
+  const FittedSurface left =
+      weighed_ring_line(line, ring.point_lidar, Eigen::Matrix3d::Identity(), {0.0, 1.0});
+  EXPECT_EQ(left.weights, (std::array{0.0, 1.0}));
+}
+
 TEST(RingLine, StaysAsItIsWhereItCrossesTheRings) {
   const Eigen::Vector3d at_pole(9.0, -4.0, 1.5);
   const Eigen::Matrix3d R_map_lidar =
       Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   const auto left_of = [&](const Eigen::Vector3d& along_map, double weight) {
     const FittedSurface line = line_through(R_map_lidar * at_pole, along_map.normalized());
-    return weighed_ring_line(line, at_pole, R_map_lidar, weight);
+    return weighed_ring_line(line, at_pole, R_map_lidar, {1.0, weight});
   };
   for (const FittedSurface& left : {left_of(Eigen::Vector3d::UnitZ(), 0.3),
                                     left_of({0.3, 0.2, 1.0}, 0.3), left_of({1.0, 0.0, 0.0}, 1.0)}) {
@@ -313,11 +321,13 @@ TEST(RingLine, StaysAsItIsWhereItCrossesTheRings) {
 
 TEST(RingLine, StaysWhatIsNoLineOrLiesOnTheAxis) {
   const FittedSurface plane{Eigen::Vector3d::Zero(), {Eigen::Vector3d::UnitX()}, 1};
-  EXPECT_EQ(weighed_ring_line(plane, {5.0, 0.0, 0.0}, Eigen::Matrix3d::Identity(), 0.3).weights,
-            (std::array{1.0, 1.0}));
+  EXPECT_EQ(
+      weighed_ring_line(plane, {5.0, 0.0, 0.0}, Eigen::Matrix3d::Identity(), {1.0, 0.3}).weights,
+      (std::array{1.0, 1.0}));
   const FittedSurface line = line_through({0.0, 0.0, 3.0}, Eigen::Vector3d::UnitX());
-  EXPECT_EQ(weighed_ring_line(line, {0.0, 0.0, 3.0}, Eigen::Matrix3d::Identity(), 0.3).weights,
-            (std::array{1.0, 1.0}));
+  EXPECT_EQ(
+      weighed_ring_line(line, {0.0, 0.0, 3.0}, Eigen::Matrix3d::Identity(), {1.0, 0.3}).weights,
+      (std::array{1.0, 1.0}));
 }
 
 TEST(Residual, JacobianOfALineIsItsNumericalDerivative) {

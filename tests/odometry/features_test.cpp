@@ -208,5 +208,23 @@ TEST(RingCurvature, IsTheSquaredSumOfTenDifferences) {
   }
 }
 
+TEST(ExtractSurfaces, TellsLevelGroundFromWhatStandsUp) {
+  Scan scan;
+  for (float x = -9.0F; x < 9.0F; x += 0.1F) {
+    for (float y = -9.0F; y < 9.0F; y += 0.1F) scan.points_lidar.emplace_back(x, y, -1.7F);
+    for (float z = -1.7F; z < 2.0F; z += 0.1F) scan.points_lidar.emplace_back(x, 9.5F, z);
+  }
+  const Features features = extract_surfaces(scan, FeatureConfig{});
+  ASSERT_EQ(features.is_level.size(), scan.size());
+  std::size_t level = 0, upright = 0;
+  for (const std::uint32_t i : features.surfaces) {
+    const bool is_wall = scan.points_lidar[i].y() > 9.2F;
+    EXPECT_EQ(features.is_level[i], !is_wall) << scan.points_lidar[i].transpose();
+    (is_wall ? upright : level) += 1;
+  }
+  EXPECT_GT(level, 50U);
+  EXPECT_GT(upright, 50U);
+}
+
 }  // namespace
 }  // namespace stillmap

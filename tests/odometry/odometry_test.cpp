@@ -71,8 +71,9 @@ TEST_F(OdometrySequence, FollowsTheTruthNearlyWithoutWeights) {
   }
 }
 
-/// One scan of this street is all rings: by surfaces the second one stays where the first was.
-TEST_F(OdometrySequence, FewRingsBeginByEdgesAndPlanesAndGoOnBySurfaces) {
+/// One scan of this street is all rings, on the road and on walls: those of the road lie where the
+/// lidar is.
+TEST_F(OdometrySequence, FewRingsFollowByWhateverTheyBegin) {
   Odometry begins_by_rings(OdometryConfig{}, test::test_lidar());
   OdometryConfig config;
   config.features.min_surface_rings = 8;
@@ -81,7 +82,7 @@ TEST_F(OdometrySequence, FewRingsBeginByEdgesAndPlanesAndGoOnBySurfaces) {
     return (all.back().T_map_lidar.translation() - quiet().T_map_lidar.back().translation()).norm();
   };
   EXPECT_LT(error_m(results(quiet(), begins_by_rings, false)), 0.2);
-  EXPECT_GT(error_m(results(quiet(), by_surfaces, false)), 0.5);
+  EXPECT_LT(error_m(results(quiet(), by_surfaces, false)), 0.2);
 }
 
 TEST_F(OdometrySequence, FollowsTheTruthWithoutLabels) {
