@@ -226,9 +226,12 @@ void ScanDataset::learn_from_sample() {
   std::ranges::sort(full_scales);
   intensity_scale_ = 1.0F / full_scales[full_scales.size() - (full_scales.size() > 2 ? 2 : 1)];
   const auto known = source_ ? source_->sensor() : std::nullopt;
-  suggested_sensor_ = known ? *known : guess_sensor(typical, files_.front().extension() == ".bin");
-  const bool is_as_kittis = suggested_sensor_.name == hdl_64e().name;
-  if (is_as_kittis && typical.time_offset_s.empty() && typical.ring.empty())
+  // KITTI's own scans tell neither times nor rings.
+  const bool is_as_kittis =
+      files_.front().extension() == ".bin" && typical.time_offset_s.empty() && typical.ring.empty();
+  suggested_sensor_ = known ? *known : guess_sensor(typical, is_as_kittis);
+  if (typical.time_offset_s.empty() && typical.ring.empty() &&
+      suggested_sensor_.name == hdl_64e().name)
     kitti_lidar_ = find_kitti_lidar();
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/dataset/binary_file.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/kitti_sequence_writer.hpp"
@@ -285,6 +286,15 @@ TEST(ScanDataset, FilesAsKittisWithoutRingsAreOfTheLidarThatTheirPointsTell) {
   EXPECT_EQ(suggested(kitti).name, "HDL-64E");
   EXPECT_EQ(suggested(above_ground).name, "HDL-64E");
   EXPECT_EQ(suggested(livox).pattern, ScanPattern::irregular);
+
+  // KITTI's files have no times of points.
+  std::filesystem::create_directories(folder.path() / "timed/velodyne");
+  std::filesystem::create_directories(folder.path() / "timed/time_offsets");
+  write_kitti_bin(folder.path() / "timed/velodyne/000000.bin", above_ground);
+  write_values<float>(folder.path() / "timed/time_offsets/000000.bin",
+                      std::vector<float>(above_ground.size(), 0.01F));
+  EXPECT_EQ(ScanDataset(folder.path() / "timed").suggested_sensor().pattern,
+            ScanPattern::irregular);
 }
 
 TEST(ScanDataset, FaultsSayWhatToDo) {
