@@ -199,12 +199,11 @@ std::optional<InertialMotion> Mapper::inertial_motion(std::int64_t stamp_ns,
 std::optional<Eigen::Isometry3d> Mapper::levelled(
     const std::optional<Eigen::Isometry3d>& T_map_lidar_prior, std::int64_t stamp_ns,
     const SweepTimes& sweep) {
-  const bool begins_map = !is_placed_ && resumed_tiles_.empty();
-  if (T_map_lidar_prior || !begins_map) return T_map_lidar_prior;
+  if (T_map_lidar_prior || !begins_map()) return T_map_lidar_prior;
   if (!inertial_.has_samples()) return std::nullopt;
   const UpDirection up =
       inertial_.up_lidar(stamp_ns + std::llround((sweep.middle_s + 0.5 * sweep.duration_s) * 1e9));
-  levelling_ = Levelling{.fault = up.fault};
+  levelling_ = Levelling{.fault = up.fault, .map = maps_begun_};
   if (!up.up_lidar) return std::nullopt;
   levelling_->tilt_rad = std::acos(std::clamp(up.up_lidar->z(), -1.0, 1.0));
   return Eigen::Isometry3d(levelling_rotation(*up.up_lidar));
@@ -326,6 +325,7 @@ void Mapper::clear_scan_state() {
   last_middle_.reset();
   inertial_.forget_motion();
   levelling_.reset();
+  ++maps_begun_;
   clock_ = {};
   resumed_tiles_ = {};
   prior_map_added_at_map_.reset();

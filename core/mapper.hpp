@@ -60,6 +60,8 @@ struct Levelling {
   double tilt_rad = 0.0;
   /// Why the map is not levelled; empty where it is.
   std::string fault{};
+  /// Counts the mapper's maps, from 0.
+  std::uint32_t map = 0;
 };
 
 /// Decides whether a scan's stamp can be believed. A stamp far in the future, or before the last
@@ -152,6 +154,8 @@ class Mapper {
   /// Whether a scan was registered since the map began or the lidar was relocated: before, nothing
   /// but its prior tells where it is.
   [[nodiscard]] bool is_placed() const { return is_placed_; }
+  /// Whether the next scan begins a map, which an IMU may level.
+  [[nodiscard]] bool begins_map() const { return !is_placed_ && resumed_tiles_.empty(); }
   /// Whether the next scans are given to MapperListeners::scan_prepared.
   void hand_out_scans(bool is_wanted) { hands_out_scans_ = is_wanted; }
   /// The lidar is somewhere else in the map than it seemed to be: the next scan is looked for
@@ -241,6 +245,7 @@ class Mapper {
   LabelSynchronizer label_synchronizer_;
   InertialTracker inertial_;
   std::optional<Levelling> levelling_;
+  std::uint32_t maps_begun_ = 0;
   /// Of the last scan that was registered, in the middle of its sweep; in the odometry's frame.
   std::optional<StampedPose> last_middle_;
   Odometry odometry_;

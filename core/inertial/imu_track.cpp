@@ -121,7 +121,6 @@ std::optional<SteadyMean> ImuTrack::steady_mean(std::int64_t from_ns, std::int64
   const auto is_frozen = [count](const Entry& entry) {
     return entry.repetitions >= std::min<std::ptrdiff_t>(max_repetitions, count - 1);
   };
-  if (std::any_of(first, last, is_frozen)) return std::nullopt;
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
   for (auto entry = first; entry != last; ++entry) {
@@ -142,7 +141,8 @@ std::optional<SteadyMean> ImuTrack::steady_mean(std::int64_t from_ns, std::int64
   return SteadyMean{.angular_velocity_imu = rate,
                     .up_imu = acceleration.normalized(),
                     .acceleration_m_s2 = acceleration.norm(),
-                    .duration_s = seconds(stamp(*std::prev(last)) - stamp(*first))};
+                    .duration_s = seconds(stamp(*std::prev(last)) - stamp(*first)),
+                    .is_frozen = std::any_of(first, last, is_frozen)};
 }
 
 }  // namespace stillmap

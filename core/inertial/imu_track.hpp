@@ -27,6 +27,8 @@ struct SteadyMean {
   double acceleration_m_s2 = 0.0;
   /// From its first sample to its last.
   double duration_s = 0.0;
+  /// It said the same again and again: a driver that hangs, or a simulator without noise at rest.
+  bool is_frozen = false;
 };
 
 /// The last samples of an IMU. Times are those of its stamps.
@@ -51,8 +53,7 @@ class ImuTrack {
     return entries_.empty() ? std::nullopt : std::optional(entries_.back().sample.stamp_ns);
   }
 
-  /// Nothing where the IMU was shaken or turned between these times, has too few samples, or says
-  /// the same again and again.
+  /// Nothing where the IMU was shaken or turned between these times, or has too few samples.
   [[nodiscard]] std::optional<SteadyMean> steady_mean(std::int64_t from_ns,
                                                       std::int64_t to_ns) const;
 

@@ -14,8 +14,6 @@ constexpr int max_sweep_steps = 400;
 constexpr std::int64_t up_window_ns = 500'000'000;
 /// And over this time at least: in a shorter one, to brake looks like a tilt [s].
 constexpr double min_up_s = 0.2;
-/// Where there is less, so much after it counts, too.
-constexpr std::int64_t up_window_after_ns = 300'000'000;
 /// Gravity is measured within this share of it, in m/s^2 or, as Livox's drivers have it, in g.
 constexpr double gravity_m_s2 = 9.81;
 constexpr double max_gravity_share = 0.15;
@@ -107,7 +105,8 @@ UpDirection InertialTracker::up_lidar(std::int64_t time_ns) const {
     mean = track_.steady_mean(from_ns, imu_time(time_ns + up_window_after_ns));
   if (!mean)
     return {.fault =
-                "the lidar was shaken or turned, or the IMU says too little or always the same"};
+                "the lidar was shaken or turned as the map began, the IMU sends too few "
+                "samples, or takes gravity off its accelerations"};
   if (mean->duration_s < min_up_s)
     return {.fault = "its samples of the start are of less than 0.2 s"};
   if (!is_gravity(mean->acceleration_m_s2)) {
@@ -148,6 +147,7 @@ void InertialTracker::learn_at_rest(std::int64_t from_ns, std::int64_t to_ns,
   rest_->rotation += registered;
   if (rest_->rotation.norm() > max_rest_rotation_rad) return rest_.reset();
   const auto mean = track_.steady_mean(imu_time(rest_->from_ns), imu_time(to_ns));
+  if (mean && mean->is_frozen) return rest_.reset();
   if (!mean && seconds(to_ns - rest_->from_ns) > max_rest_s) return rest_.reset();
   if (!mean || mean->duration_s < min_rest_s) return;
   calibration_.learn_at_rest(mean->angular_velocity_imu);

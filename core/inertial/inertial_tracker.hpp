@@ -53,6 +53,10 @@ class InertialTracker {
   /// of the tenths of a second after it. Nothing where the lidar was shaken or turned, where what
   /// is measured is not gravity, or where the mount is not known.
   [[nodiscard]] UpDirection up_lidar(std::int64_t time_ns) const;
+  /// Samples up to so long after it are looked at.
+  static constexpr std::int64_t up_window_after_ns = 300'000'000;
+  /// Whether the mount is known, without which no sample tells.
+  [[nodiscard]] bool may_tell_up() const { return mount_is_known_; }
 
   /// The lidar's rotation between two times was found by registration.
   void learn(std::int64_t from_ns, std::int64_t to_ns, const Eigen::Matrix3d& R_from_to);

@@ -53,7 +53,7 @@ struct Cell {
   /// Of voxels of a ground class.
   std::optional<float> ground;
   /// Of all voxels, and of those of a ground class, where there are storeys.
-  std::vector<float> heights, ground_heights;
+  std::vector<float> heights{}, ground_heights{};
 
   /// The lowest height, and each that has a storey's gap below it.
   static std::vector<float> floors_of(std::vector<float>& heights) {

@@ -120,7 +120,8 @@ struct RegistrationConfig {
   /// Fewer correspondences than this give no pose.
   int min_correspondences = 50;
   /// A direction is degenerate when one metre along it (or a turn that moves points by one metre on
-  /// average) changes the mean squared residual by less than this share.
+  /// average) changes the mean squared residual by less than this share; it then keeps the
+  /// prediction. A shift is degenerate below 0.01, too, and followed.
   double min_observability = 0.002;
 };
 

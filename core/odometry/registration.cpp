@@ -193,6 +193,9 @@ NormalEquations build_normal_equations(std::span<const Correspondence> correspon
   return equations;
 }
 
+/// A scan of nothing but rings on level ground has none.
+constexpr double least_weights = 1e-9;
+
 /// Along a tunnel the noise of its walls' normals looks like so large a share of residuals that see
 /// the way: it is followed, and no pose is good by it.
 constexpr double min_shift_observability = 0.01;
@@ -204,44 +207,43 @@ constexpr double min_shift_observability = 0.01;
 class ErrorDirections {
  public:
   ErrorDirections(const NormalEquations& equations, double min_observability)
-      : equations_(equations), min_observability_(min_observability) {
+      : equations_(equations),
+        weights_(std::max(equations.weights, least_weights)),
+        min_observability_(min_observability) {
     constexpr double min_squared_arm_m2 = 1.0;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> arms(equations.arms / equations.weights);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> arms(equations.arms / weights_);
     const Eigen::Vector3d squared_arms_m2 = arms.eigenvalues().cwiseMax(min_squared_arm_m2);
     scale_.bottomRightCorner<3, 3>() = arms.eigenvectors() *
                                        squared_arms_m2.cwiseSqrt().cwiseInverse().asDiagonal() *
                                        arms.eigenvectors().transpose();
-    eigen_.compute(scale_ * equations.hessian * scale_ / equations.weights);
+    eigen_.compute(scale_ * equations.hessian * scale_ / weights_);
   }
 
   /// Whether the scan observes all of them, and shifts by more than the noise of normals looks
   /// like.
   [[nodiscard]] bool are_clear() const {
-    for (int k = 0; k < 6; ++k) {
-      const double shift = eigen_.eigenvectors().col(k).head<3>().squaredNorm();
-      if (!observes(k) || eigen_.eigenvalues()[k] < shift * min_shift_observability) return false;
-    }
+    for (int k = 0; k < 6; ++k)
+      if (!is_clear(k)) return false;
     return true;
   }
 
   /// Gauss-Newton step, without the directions that the scan does not observe.
   [[nodiscard]] PoseTangent step() const {
-    const PoseTangent gradient = scale_ * equations_.gradient / equations_.weights;
+    const PoseTangent gradient = scale_ * equations_.gradient / weights_;
     PoseTangent along = eigen_.eigenvectors().transpose() * gradient;
     for (int k = 0; k < 6; ++k) along[k] *= observes(k) ? -1.0 / eigen_.eigenvalues()[k] : 0.0;
     return scale_ * (eigen_.eigenvectors() * along);
   }
 
-  /// Variance of the weighted residuals times (J'WJ)^-1. Directions that are not observed, in which
-  /// the pose is the prediction, get the variance of one metre.
+  /// Variance of the weighted residuals times (J'WJ)^-1. Directions that are not clear, in which
+  /// the pose may be the prediction, get the variance of one metre.
   [[nodiscard]] Matrix6d covariance() const {
     // A line residual has two degrees of freedom, a plane residual one.
     const double freedom = std::max(1.0, 2.0 * equations_.edges + equations_.planes - 6.0);
     const double variance = std::max(equations_.weighted_squares / freedom, 1e-8);
     PoseTangent deviation;
     for (int k = 0; k < 6; ++k) {
-      const double information =
-          observes(k) ? eigen_.eigenvalues()[k] * equations_.weights / variance : 0.0;
+      const double information = is_clear(k) ? eigen_.eigenvalues()[k] * weights_ / variance : 0.0;
       deviation[k] = 1.0 / std::sqrt(1.0 + information);
     }
     const Matrix6d root = scale_ * eigen_.eigenvectors() * deviation.asDiagonal();
@@ -250,8 +252,13 @@ class ErrorDirections {
 
  private:
   [[nodiscard]] bool observes(int k) const { return eigen_.eigenvalues()[k] > min_observability_; }
+  [[nodiscard]] bool is_clear(int k) const {
+    const double shift = eigen_.eigenvectors().col(k).head<3>().squaredNorm();
+    return observes(k) && eigen_.eigenvalues()[k] >= shift * min_shift_observability;
+  }
 
   const NormalEquations& equations_;
+  double weights_;
   double min_observability_;
   Matrix6d scale_ = Matrix6d::Identity();
   Eigen::SelfAdjointEigenSolver<Matrix6d> eigen_;
@@ -389,7 +396,8 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
     return lost;
   }
   result.health = degenerate ? OdometryHealth::degenerate : OdometryHealth::good;
-  result.rms_residual_m = std::sqrt(equations.weighted_squares / equations.weights);
+  result.rms_residual_m =
+      std::sqrt(equations.weighted_squares / std::max(equations.weights, least_weights));
   result.covariance = ErrorDirections(equations, limits.min_observability).covariance();
   return result;
 }

@@ -14,7 +14,8 @@ namespace {
 
 /// Radius of the plane fit [m].
 constexpr double plane_reach_m = 0.5;
-/// No robot's slope explains more across unknown ground: height difference [m] and rise per metre.
+/// Ground beyond unknown ground may lie off the slope that leads there by so much: height
+/// difference [m] and rise per metre.
 constexpr double unseen_drop_m = 0.25;
 constexpr double unseen_slope = 0.5;
 /// Distance on either side up to which the rise without the step is measured [cells].
@@ -99,6 +100,26 @@ std::optional<double> rise_beyond(const GroundGrid& ground, int x, int y, std::p
   return std::abs(first_m) < std::abs(second_m) ? first_m : second_m;
 }
 
+/// Rise per cell of the four steps between cells beyond either side: their median where the middle
+/// two agree in sign, else none. Noise, which spoils one of two, leaves a slope in four; of an edge
+/// or of the next step one has anything.
+std::optional<double> rise_around(const GroundGrid& ground, int x, int y, std::pair<int, int> d) {
+  std::array<double, 4> rises_m{};
+  std::size_t count = 0;
+  for (const int sign : {-1, 1}) {
+    for (const int i : {1, 2}) {
+      const auto near_m = height_at(ground, x + sign * i * d.first, y + sign * i * d.second);
+      const auto far_m =
+          height_at(ground, x + sign * (i + 1) * d.first, y + sign * (i + 1) * d.second);
+      if (!near_m || !far_m) return std::nullopt;
+      rises_m.at(count++) = sign * (*far_m - *near_m);
+    }
+  }
+  std::ranges::sort(rises_m);
+  if (rises_m[1] * rises_m[2] <= 0.0) return std::nullopt;
+  return 0.5 * (rises_m[1] + rises_m[2]);
+}
+
 double step_along(const GroundGrid& ground, int x, int y, std::pair<int, int> d) {
   const double here_m = ground(x, y).height_m;
   const auto before_m = height_at(ground, x - d.first, y - d.second);
@@ -107,8 +128,8 @@ double step_along(const GroundGrid& ground, int x, int y, std::pair<int, int> d)
   const double difference_m = after_m.value_or(here_m) - before_m.value_or(here_m);
   // The rise of the steeper side; at a ramp's foot it explains the whole difference.
   double explained_m = 0.0;
-  for (const int sign : {-1, 1}) {
-    const auto rise_m = rise_beyond(ground, x, y, d, sign);
+  for (const auto& rise_m : {rise_beyond(ground, x, y, d, -1), rise_beyond(ground, x, y, d, 1),
+                             rise_around(ground, x, y, d)}) {
     if (!rise_m || *rise_m * difference_m <= 0.0) continue;
     if (std::abs(*rise_m * cells) > std::abs(explained_m)) explained_m = *rise_m * cells;
   }
@@ -125,7 +146,10 @@ double step_beyond_unknown(const GroundGrid& ground, int x, int y, std::pair<int
     for (int i = 1; i <= cells; ++i) {
       const auto beyond_m = height_at(ground, x + sign * i * d.first, y + sign * i * d.second);
       if (!beyond_m) continue;
-      const double difference_m = std::abs(*beyond_m - ground(x, y).height_m);
+      // A slope goes on beyond the gap as it comes to it.
+      const auto outwards_m = rise_beyond(ground, x, y, d, -sign);
+      const double foreseen_m = outwards_m ? sign * *outwards_m * i : 0.0;
+      const double difference_m = std::abs(*beyond_m - ground(x, y).height_m - foreseen_m);
       const bool is_slope = difference_m <= std::max(unseen_drop_m, unseen_slope * i * length_m);
       if (i > 1 && !is_slope) step_m = std::max(step_m, difference_m);
       break;

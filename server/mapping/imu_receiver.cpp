@@ -66,9 +66,11 @@ ImuReceiver::ImuReceiver(dds::Participant& participant, const std::string& ros_t
                 }
               }) {}
 
-std::vector<ImuSample> ImuReceiver::take(std::int64_t until_ns) {
+std::vector<ImuSample> ImuReceiver::take(std::int64_t until_ns, std::chrono::nanoseconds more) {
+  using std::chrono::milliseconds;
   const bool is_published = reader_.matched_writers() > 0;
-  return queue_.take(until_ns, is_published ? patience_ : std::chrono::milliseconds(0));
+  const milliseconds patience = patience_ + std::chrono::duration_cast<milliseconds>(more);
+  return queue_.take(until_ns + more.count(), is_published ? patience : milliseconds(0));
 }
 
 }  // namespace stillmap::server

@@ -52,8 +52,9 @@ class ImuReceiver {
   ImuReceiver(dds::Participant& participant, const std::string& ros_topic, DeliveryMode delivery,
               Statistics& statistics);
 
-  /// As ImuQueue::take. Does not wait where nobody publishes.
-  [[nodiscard]] std::vector<ImuSample> take(std::int64_t until_ns);
+  /// As ImuQueue::take, of samples until so much later, too, and as much more patient. Does not
+  /// wait where nobody publishes.
+  [[nodiscard]] std::vector<ImuSample> take(std::int64_t until_ns, std::chrono::nanoseconds more);
 
  private:
   std::chrono::milliseconds patience_;

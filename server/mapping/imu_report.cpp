@@ -82,9 +82,8 @@ void ImuReport::warn_of_no_help(const InertialTracker& imu) {
 }
 
 void ImuReport::tell(const std::optional<Levelling>& levelling) {
-  const bool is_new = levelling.has_value() && !has_told_levelling_;
-  has_told_levelling_ = levelling.has_value();
-  if (!is_new) return;
+  if (!levelling || told_of_map_ == levelling->map) return;
+  told_of_map_ = levelling->map;
   if (levelling->fault.empty()) {
     spdlog::info("IMU: the map is levelled by it; the lidar leans by {:.1f} degrees",
                  deg_per_rad * levelling->tilt_rad);

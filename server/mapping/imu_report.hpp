@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "core/mapper.hpp"
@@ -29,7 +30,8 @@ class ImuReport {
   bool was_believed_ = false;
   bool has_warned_of_samples_ = false;
   bool has_warned_of_rates_ = false;
-  bool has_told_levelling_ = false;
+  /// The last map whose levelling was told.
+  std::optional<std::uint32_t> told_of_map_;
 };
 
 }  // namespace stillmap::server

@@ -372,7 +372,11 @@ void MappingThread::feed_imu(const Scan& scan) {
   const std::int64_t end_ns =
       scan.stamp_ns + std::llround(1e9 * (sweep.middle_s + 0.5 * sweep.duration_s));
   const std::int64_t until_ns = mapper_.inertial().imu_time(end_ns);
-  for (const ImuSample& sample : outputs_.imu->take(until_ns)) mapper_.add(sample);
+  // A server that begins beside its drivers has seen a tenth of a second of samples: too little to
+  // level a map by.
+  const bool may_level = mapper_.begins_map() && mapper_.inertial().may_tell_up();
+  const std::chrono::nanoseconds more(may_level ? InertialTracker::up_window_after_ns : 0);
+  for (const ImuSample& sample : outputs_.imu->take(until_ns, more)) mapper_.add(sample);
 }
 
 void MappingThread::forward(MappedScan mapped) {

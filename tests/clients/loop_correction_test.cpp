@@ -48,7 +48,7 @@ class StretchThatHasWaited : public testing::Test {
         stamps.insert({voxel.first_seen_ns, voxel.last_seen_ns});
     return stamps.size();
   }
-  [[nodiscard]] LoopOptions options() const { return {scratch_ / "scans", {}, {}}; }
+  [[nodiscard]] LoopOptions options() const { return {scratch_ / "scans", 0.0, {}, {}}; }
 
  private:
   ScratchFolder scratch_;

@@ -118,18 +118,21 @@ TEST(ImuTrack, TellsUpOnlyWhereItMovesSteadily) {
   ASSERT_TRUE(steady);
   EXPECT_LT(std::acos(steady->up_imu.dot(up)), 0.005);
   EXPECT_NEAR(steady->angular_velocity_imu.z(), 0.004, 1e-9);
+  EXPECT_FALSE(steady->is_frozen);
   EXPECT_FALSE(track.steady_mean(500 * ms, 990 * ms));
   EXPECT_FALSE(track.steady_mean(0, 15 * ms));
 }
 
-TEST(ImuTrack, TakesAFrozenSensorForNoRest) {
+TEST(ImuTrack, TellsAFrozenSensor) {
   for (const int step_ms : {5, 40}) {
     ImuTrack track;
     for (int k = 0; k <= 500 / step_ms; ++k) {
       const auto sample = ImuSample{k * step_ms * ms, {0.01, 0.0, 0.0}, {0.1, 0.0, 9.7}};
       ASSERT_EQ(track.add(sample), ImuSampleFate::taken);
     }
-    EXPECT_FALSE(track.steady_mean(0, 500 * ms)) << step_ms;
+    const auto mean = track.steady_mean(0, 500 * ms);
+    ASSERT_TRUE(mean) << step_ms;
+    EXPECT_TRUE(mean->is_frozen) << step_ms;
   }
 }
 

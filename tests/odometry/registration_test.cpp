@@ -116,6 +116,12 @@ std::vector<Eigen::Vector3f> arcs_on_ground() {
   return points;
 }
 
+FeatureSets as_map(const std::vector<FeaturePoint>& surfaces) {
+  FeatureSets sets;
+  sets.planes = surfaces;
+  return sets;
+}
+
 TEST(RegisterFeatures, RingsOnLevelGroundDoNotSayThatTheLidarStands) {
   LocalMap map{LocalMapConfig{}};
   FeatureSets features, level;
@@ -125,13 +131,28 @@ TEST(RegisterFeatures, RingsOnLevelGroundDoNotSayThatTheLidarStands) {
     point.is_level = true;
     level.surfaces.push_back(point);
   }
-  extend_local_map(map, {.planes = features.surfaces}, Eigen::Isometry3d::Identity(), {});
+  extend_local_map(map, as_map(features.surfaces), Eigen::Isometry3d::Identity(), {});
   const Eigen::Isometry3d moved = level_pose(0.3, 0.0, 0.0);
   const auto x_of = [&](const FeatureSets& scan) {
     return register_features(scan, map, moved, OdometryConfig{}).T_map_lidar.translation().x();
   };
   EXPECT_NEAR(x_of(level), 0.3, 0.01);
   EXPECT_LT(x_of(features), 0.1) << "rings that may be of walls do say so";
+}
+
+TEST(RegisterFeatures, NothingButRingsOnLevelGroundIsDegenerate) {
+  LocalMap map{LocalMapConfig{}};
+  FeatureSets features;
+  for (const Eigen::Vector3f& p : arcs_on_ground())
+    features.surfaces.push_back({.position_lidar = p, .is_level = true});
+  features.sparse_rings = true;
+  extend_local_map(map, as_map(features.surfaces), Eigen::Isometry3d::Identity(), {});
+  const Eigen::Isometry3d moved = level_pose(0.3, 0.0, 0.0);
+  const OdometryResult result = register_features(features, map, moved, OdometryConfig{});
+  EXPECT_EQ(result.health, OdometryHealth::degenerate);
+  EXPECT_TRUE(result.T_map_lidar.isApprox(moved, 0.05));
+  EXPECT_TRUE(result.covariance.allFinite());
+  EXPECT_TRUE(std::isfinite(result.rms_residual_m));
 }
 
 TEST(RegisterFeatures, WhereTheScanIsNotHeardTheCovarianceIsThatOfTheGuess) {

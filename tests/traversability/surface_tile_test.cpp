@@ -143,11 +143,28 @@ TEST(SurfaceShape, ADropBeyondUnknownGroundIsAStepAtBothItsEnds) {
 }
 
 TEST(SurfaceShape, ASlopeThatGoesOnBeyondUnknownGroundIsNoStep) {
-  GroundGrid ground = ground_of([](double x, double) { return 0.45 * x; });
-  for_each_cell(ground, [&](int x, int y) {
-    if (x > middle && x <= middle + 5) ground(x, y) = {};
-  });
-  EXPECT_LT(shape_in_the_middle(ground).step_m, 0.1);
+  for (const double rise : {0.45, 0.55, 1.2}) {
+    for (const int gap : {2, 5}) {
+      GroundGrid ground = ground_of([&](double x, double) { return rise * x; });
+      for_each_cell(ground, [&](int x, int y) {
+        if (x > middle && x <= middle + gap) ground(x, y) = {};
+      });
+      EXPECT_LT(shape_in_the_middle(ground).step_m, 0.1) << rise << ", " << gap;
+    }
+  }
+}
+
+TEST(SurfaceShape, NoiseOnASlopeIsSeldomAStep) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise_m(0.0, 0.012);
+  constexpr int trials = 400;
+  int steps = 0;
+  for (int k = 0; k < trials; ++k) {
+    const GroundGrid ground =
+        ground_of([&](double x, double) { return 0.14 * x + noise_m(random); });
+    steps += shape_in_the_middle(ground).step_m > 0.09F ? 1 : 0;
+  }
+  EXPECT_LT(steps, trials / 100);
 }
 
 }  // namespace
