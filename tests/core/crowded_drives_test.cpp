@@ -138,7 +138,7 @@ TEST(CrowdedDrives, MapWhatWasSeenWhileThePlaceWasInDoubt) {
   const Simulation simulation(config);
   MapperConfig doubtful;
   doubtful.sensor = config.sensor;
-  doubtful.odometry.registration.min_observability = 0.02;
+  doubtful.odometry.registration.min_observability = 0.025;
   Mapper mapper(doubtful, std::make_unique<PassthroughSegmenter>());
   std::vector<Eigen::Vector3d> waiting_map;
   std::size_t entered = 0;
