@@ -13,6 +13,7 @@
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/dataset/binary_file.hpp"
+#include "core/dataset/kitti_files.hpp"
 #include "core/dataset/scan_dataset.hpp"
 #include "core/evaluation/segmentation_score.hpp"
 #include "core/picture/segmentation_picture.hpp"
