@@ -154,8 +154,11 @@ class Mapper {
   /// Whether a scan was registered since the map began or the lidar was relocated: before, nothing
   /// but its prior tells where it is.
   [[nodiscard]] bool is_placed() const { return is_placed_; }
-  /// Whether the next scan begins a map, which an IMU may level.
-  [[nodiscard]] bool begins_map() const { return !is_placed_ && resumed_tiles_.empty(); }
+  /// Whether the next scan begins a map, which an IMU may level: one that was found anywhere in a
+  /// map begins none.
+  [[nodiscard]] bool begins_map() const {
+    return !is_placed_ && resumed_tiles_.empty() && scans_to_confirm_ == 0;
+  }
   /// Whether the next scans are given to MapperListeners::scan_prepared.
   void hand_out_scans(bool is_wanted) { hands_out_scans_ = is_wanted; }
   /// The lidar is somewhere else in the map than it seemed to be: the next scan is looked for
