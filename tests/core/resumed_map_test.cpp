@@ -177,5 +177,16 @@ TEST(ResumedMap, APreparedBeginningChangesNoPose) {
   }
 }
 
+TEST(ResumedMap, IsNotBegunByALidarThatWasFoundInTheMapOfThisRun) {
+  Mapper mapper(in_hall(), std::make_unique<NullSegmenter>());
+  EXPECT_TRUE(mapper.begins_map());
+  ASSERT_TRUE(mapper.process(test::room_scan(20)));
+  EXPECT_FALSE(mapper.begins_map());
+  mapper.relocate(Odometry(in_hall().odometry, vlp_16()), 3);
+  EXPECT_FALSE(mapper.begins_map());
+  mapper.reset(7);
+  EXPECT_TRUE(mapper.begins_map());
+}
+
 }  // namespace
 }  // namespace stillmap
