@@ -15,6 +15,10 @@ constexpr double line_dominance = 3.0;
 constexpr double plane_thickness_m = 0.2;
 /// A line is an edge when it crosses the rings at an angle with at least this sine.
 constexpr double min_sine_to_ring = 0.5;
+/// A plane that leans over its ring by up to this sine does so by the noise of its points; one that
+/// leans by more than the other is none.
+constexpr double noise_sine = 0.5;
+constexpr double across_sine = 0.8;
 
 /// Mean and covariance of the neighbours.
 struct Moments {
@@ -122,6 +126,23 @@ std::optional<FittedSurface> fit_surface(const Neighbours& neighbours, double mi
   const Moments moments = moments_of(neighbours);
   if (auto plane = plane_of(moments, neighbours, min_plane_width)) return plane;
   return line_of(moments);
+}
+
+std::optional<FittedSurface> surface_along(const FittedSurface& surface,
+                                           const Eigen::Vector3d& tangent_map) {
+  if (surface.normal_count == 2) {
+    const Eigen::Vector3d along_map = surface.normals[0].cross(surface.normals[1]);
+    const Eigen::Vector3d normal = along_map.cross(tangent_map);
+    if (!(normal.norm() > min_sine_to_ring)) return surface;
+    return FittedSurface{surface.centre_map, {normal.normalized(), Eigen::Vector3d::Zero()}, 1};
+  }
+  const Eigen::Vector3d& normal = surface.normals[0];
+  const double lean = normal.dot(tangent_map);
+  if (std::abs(lean) <= noise_sine) return surface;
+  if (std::abs(lean) > across_sine) return std::nullopt;
+  FittedSurface turned = surface;
+  turned.normals[0] = (normal - lean * tangent_map).normalized();
+  return turned;
 }
 
 FittedSurface weighed_ring_line(const FittedSurface& line, const Eigen::Vector3d& point_lidar,

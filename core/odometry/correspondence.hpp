@@ -37,6 +37,14 @@ struct FittedSurface {
 [[nodiscard]] std::optional<FittedSurface> fit_surface(
     const Neighbours& neighbours, double min_plane_width = RegistrationConfig{}.min_plane_width);
 
+/// The surface as the scan sees it, whose smooth ring runs along `tangent_map` there (length 1, or
+/// zero: not known, and the surface stays as it is). A line across it is one column of a smooth
+/// wall and becomes the plane through both; a plane that leans over the tangent is turned to
+/// contain it. Nothing where the plane stands across the ring. On long smooth walls the points far
+/// ahead lie in columns farther apart than their neighbours, which go wherever the lidar goes.
+[[nodiscard]] std::optional<FittedSurface> surface_along(const FittedSurface& surface,
+                                                         const Eigen::Vector3d& tangent_map);
+
 /// What the distances from a line along the lidar's rings count, 0..1.
 struct RingLineWeights {
   double along_ray = 1.0;

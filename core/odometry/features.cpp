@@ -13,6 +13,8 @@
 #include <utility>
 
 #include "core/lidar/voxel_index.hpp"
+#include "core/odometry/ring_order.hpp"
+#include "core/odometry/ring_tangents.hpp"
 #include "core/odometry/voxel_downsample.hpp"
 
 namespace stillmap {
@@ -24,24 +26,6 @@ constexpr std::size_t sectors = 6;
 constexpr float jump_share = 0.1F;
 /// A picked edge covers its neighbours up to a squared step of this size [m^2] (A-LOAM).
 constexpr float same_edge_step_m2 = 0.05F;
-
-/// Points of the scan by ring: ring r is order[begin[r] .. begin[r + 1]), in firing order.
-struct RingOrder {
-  std::vector<std::uint32_t> order;
-  std::vector<std::uint32_t> begin;
-};
-
-RingOrder order_by_ring(const Scan& scan) {
-  const std::size_t rings =
-      scan.empty() ? 0 : std::size_t{*std::ranges::max_element(scan.ring)} + 1;
-  RingOrder rings_of{std::vector<std::uint32_t>(scan.size()),
-                     std::vector<std::uint32_t>(rings + 1, 0)};
-  for (const std::uint16_t ring : scan.ring) ++rings_of.begin[ring + 1U];
-  std::partial_sum(rings_of.begin.begin(), rings_of.begin.end(), rings_of.begin.begin());
-  std::vector<std::uint32_t> next(rings_of.begin.begin(), rings_of.begin.end());
-  for (std::uint32_t i = 0; i < scan.size(); ++i) rings_of.order[next[scan.ring[i]]++] = i;
-  return rings_of;
-}
 
 /// Whether the azimuth runs one way along the ring, but for the noise of motion compensation.
 bool runs_round(const std::vector<Eigen::Vector3f>& points, std::span<const std::uint32_t> ring) {
@@ -273,6 +257,7 @@ Features extract_surfaces(const Scan& scan, const FeatureConfig& config) {
   features.is_level.resize(scan.size());
   for (const std::uint32_t i : features.surfaces)
     features.is_level[i] = !columns.stands_up(scan.points_lidar[i]);
+  if (!scan.ring.empty()) features.tangents = ring_tangents(scan, features.surfaces);
   const bool are_points_spaced = config.surface_spacing_m == map_point_spacing_m;
   pick_points(scan,
               are_points_spaced
@@ -284,13 +269,10 @@ Features extract_surfaces(const Scan& scan, const FeatureConfig& config) {
 
 Features extract_features(const Scan& scan, const FeatureConfig& config) {
   assert(scan.ring.size() == scan.size());
-  RingOrder rings = order_by_ring(scan);
-  const std::size_t ring_count = rings.begin.size() - 1;
-  std::vector<RingFeatures> of_ring(ring_count);
-  tbb::parallel_for(std::size_t{0}, ring_count, [&](std::size_t r) {
-    const std::span ring(rings.order.begin() + rings.begin[r],
-                         rings.order.begin() + rings.begin[r + 1]);
-    of_ring[r] = features_of_ring(scan, ring, config);
+  RingOrder rings(scan);
+  std::vector<RingFeatures> of_ring(rings.count());
+  tbb::parallel_for(std::size_t{0}, rings.count(), [&](std::size_t r) {
+    of_ring[r] = features_of_ring(scan, rings.ring(r), config);
   });
   std::vector<std::uint32_t> edges;
   std::vector<std::uint32_t> planes;

@@ -23,6 +23,8 @@ struct Features {
   std::vector<std::uint32_t> surfaces;
   /// Of every point of the scan, where it has surfaces: it is one, and on level ground.
   std::vector<bool> is_level;
+  /// ring_tangents() of the scan, for its surfaces, where it has rings.
+  std::vector<Eigen::Vector3f> tangents;
   /// Points of any kind, spread evenly: inserted into the local map for the alignment of points.
   std::vector<std::uint32_t> points;
   /// Those of `points` that are aligned: on something that stands up, and on level ground.

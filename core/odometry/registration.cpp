@@ -69,14 +69,17 @@ void look_up(const FeaturePoint& feature, FeatureKind kind, const FeatureMap& ma
   const Neighbours neighbours = map.nearest(found.searched_map, config.neighbours,
                                             static_cast<float>(config.max_neighbour_distance_m));
   found.in_known_space = neighbours.count > 0;
-  const auto surface = fit(kind, neighbours, config.min_plane_width);
+  const auto fitted = fit(kind, neighbours, config.min_plane_width);
+  const auto surface =
+      fitted ? surface_along(*fitted, R_map_lidar * feature.tangent_lidar.cast<double>())
+             : std::nullopt;
   found.found = surface.has_value();
   if (!surface) return;
   const double thin_m2 = config.plane_deviation_m * config.plane_deviation_m;
   found.thinness = thin_m2 > 0.0 ? thin_m2 / (thin_m2 + surface->variance_m2) : 1.0;
   found.surface = weighed_ring_line(*surface, found.point_lidar, R_map_lidar,
                                     ring_line_weights(feature, config));
-  if (config.max_extrapolation > 0.0 && surface->normal_count == 1 &&
+  if (config.max_extrapolation > 0.0 && fitted->normal_count == 1 &&
       extrapolation(*surface, neighbours, found.searched_map.cast<double>()) >
           config.max_extrapolation) {
     found.surface.weights[0] = extrapolated_weight;

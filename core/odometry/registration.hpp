@@ -21,6 +21,8 @@ struct FeaturePoint {
   float sweep_part = 0.0F;
   /// On level ground, as far as its scan tells.
   bool is_level = false;
+  /// Along its surface, as its ring tells, of length 1 in the lidar's frame; zero where unknown.
+  Eigen::Vector3f tangent_lidar = Eigen::Vector3f::Zero();
 };
 
 /// What the motion within a sweep is expected to be: the motion since the last pose, scaled to the

@@ -67,6 +67,7 @@ class FeaturePoints {
     if (rolling())
       point.sweep_part = static_cast<float>(parts_.sweep.part(parts_.scan.time_offset_s[i]));
     if (!parts_.features.is_level.empty()) point.is_level = parts_.features.is_level[i];
+    if (!parts_.features.tangents.empty()) point.tangent_lidar = parts_.features.tangents[i];
     return point;
   }
   /// Those of `indices` for which `is_used(i)` holds.

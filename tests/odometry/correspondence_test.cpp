@@ -351,5 +351,46 @@ TEST(Residual, JacobianOfAPlaneIsItsNumericalDerivative) {
   }
 }
 
+TEST(SurfaceAlong, AColumnOfASmoothWallIsThePlaneThroughItsRing) {
+  const FittedSurface column{
+      {30.0, 4.0, 1.0}, {Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitX()}, 2};
+  const auto wall = surface_along(column, Eigen::Vector3d(1.0, 0.0, -0.05).normalized());
+  ASSERT_TRUE(wall);
+  EXPECT_EQ(wall->normal_count, 1U);
+  EXPECT_TRUE(wall->centre_map.isApprox(column.centre_map));
+  EXPECT_NEAR(std::abs(wall->normals[0].y()), 1.0, 1e-9);
+  // A line along the ring says nothing of the surface across it.
+  const auto along = surface_along(column, Eigen::Vector3d(0.1, 0.0, 1.0).normalized());
+  ASSERT_TRUE(along);
+  EXPECT_EQ(along->normal_count, 2U);
+  const auto unknown = surface_along(column, Eigen::Vector3d::Zero());
+  ASSERT_TRUE(unknown);
+  EXPECT_EQ(unknown->normal_count, 2U);
+}
+
+TEST(SurfaceAlong, APlaneContainsTheRingOrIsNone) {
+  const Eigen::Vector3d ring = Eigen::Vector3d::UnitX();
+  const auto leaning_by = [](double sine) {
+    FittedSurface plane{
+        Eigen::Vector3d(30.0, 4.0, 1.0),
+        {Eigen::Vector3d(sine, std::sqrt(1.0 - sine * sine), 0.0), Eigen::Vector3d::Zero()},
+        1};
+    plane.variance_m2 = 0.001;
+    return plane;
+  };
+  const auto noise = surface_along(leaning_by(0.4), ring);
+  ASSERT_TRUE(noise);
+  EXPECT_NEAR(noise->normals[0].x(), 0.4, 1e-12);
+  for (const double sine : {-0.6, 0.55, 0.7}) {
+    const auto turned = surface_along(leaning_by(sine), ring);
+    ASSERT_TRUE(turned) << sine;
+    EXPECT_NEAR(turned->normals[0].dot(ring), 0.0, 1e-12);
+    EXPECT_NEAR(turned->normals[0].norm(), 1.0, 1e-12);
+    EXPECT_EQ(turned->variance_m2, 0.001);
+  }
+  EXPECT_FALSE(surface_along(leaning_by(0.9), ring));
+  EXPECT_TRUE(surface_along(leaning_by(0.9), Eigen::Vector3d::Zero()));
+}
+
 }  // namespace
 }  // namespace stillmap

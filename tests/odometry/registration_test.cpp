@@ -140,6 +140,33 @@ TEST(RegisterFeatures, RingsOnLevelGroundDoNotSayThatTheLidarStands) {
   EXPECT_LT(x_of(features), 0.1) << "rings that may be of walls do say so";
 }
 
+/// Two smooth walls as the columns of a lidar meet them between them, farther apart the farther
+/// ahead they are, and level ground.
+FeatureSets columns_of_walls(const Eigen::Vector3f& tangent_lidar) {
+  FeatureSets sets;
+  for (const Eigen::Vector3f& p : arcs_on_ground())
+    sets.surfaces.push_back({.position_lidar = p, .is_level = true});
+  for (const float y : {-3.5F, 4.5F}) {
+    for (float azimuth = 0.06F; azimuth < 3.08F; azimuth += 0.006F)
+      for (float z = -1.5F; z < 1.0F; z += 0.2F)
+        sets.surfaces.push_back({.position_lidar = {std::abs(y) / std::tan(azimuth), y, z},
+                                 .tangent_lidar = tangent_lidar});
+  }
+  return sets;
+}
+
+TEST(RegisterFeatures, ColumnsOnSmoothWallsDoNotSayThatTheLidarStands) {
+  const auto x_found = [](const FeatureSets& scan) {
+    LocalMap map{LocalMapConfig{}};
+    extend_local_map(map, as_map(scan.surfaces), Eigen::Isometry3d::Identity(), {});
+    const Eigen::Isometry3d moved = level_pose(0.2, 0.0, 0.0);
+    return register_features(scan, map, moved, OdometryConfig{}).T_map_lidar.translation().x();
+  };
+  EXPECT_NEAR(x_found(columns_of_walls(Eigen::Vector3f::UnitX())), 0.2, 0.02);
+  EXPECT_LT(x_found(columns_of_walls(Eigen::Vector3f::Zero())), 0.1)
+      << "columns that may be posts do say so";
+}
+
 TEST(RegisterFeatures, NothingButRingsOnLevelGroundIsDegenerate) {
   LocalMap map{LocalMapConfig{}};
   FeatureSets features;

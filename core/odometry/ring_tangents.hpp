@@ -1,0 +1,19 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/lidar/scan.hpp"
+
+namespace stillmap {
+
+/// Of every point of the scan, the direction in which its surface goes on along its ring, of length
+/// 1 in the lidar's frame; zero where it does not go straight on to both sides, and of those that
+/// are not `chosen`. The surface contains it, whatever the points of other rings and scans make of
+/// it. `scan.ring` must be known.
+[[nodiscard]] std::vector<Eigen::Vector3f> ring_tangents(const Scan& scan,
+                                                         std::span<const std::uint32_t> chosen);
+
+}  // namespace stillmap
