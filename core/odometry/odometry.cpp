@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/lidar/sweep_merger.hpp"
+#include "core/odometry/faint_shifts.hpp"
 #include "core/odometry/odometry_steps.hpp"
 #include "core/odometry/se3.hpp"
 
@@ -74,6 +75,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   state.confirm_place(features, prediction, step.result);
   state.begin_anew(features, step.result);
   step.result = doubted_where_pulled(step.result, features, state.map, state.config);
+  step.result = doubted_where_shift_fits(step.result, features, state.map, state.method());
   state.straighten(features, time_ns, sweep, step.result);
   step.T_map_lidar_middle = step.result.T_map_lidar;
   move_to_middle(scan, sweep, step.result.sweep_correction);

@@ -109,6 +109,33 @@ void find_correspondences(std::span<const FeaturePoint> features, FeatureKind ki
   });
 }
 
+std::size_t count_of(const FeatureSets& features) {
+  return features.edges.size() + features.planes.size() + features.surfaces.size();
+}
+
+/// Of edges, planes and surfaces, one after the other.
+void find_all_correspondences(const FeatureSets& features, const LocalMap& map,
+                              const OdometryResult& pose, const RegistrationConfig& config,
+                              std::span<Correspondence> found) {
+  const std::size_t edges = features.edges.size();
+  const std::size_t planes = features.planes.size();
+  find_correspondences(features.edges, FeatureKind::edge, map.edges, pose, config,
+                       found.first(edges));
+  find_correspondences(features.planes, FeatureKind::plane, map.planes, pose, config,
+                       found.subspan(edges, planes));
+  find_correspondences(features.surfaces, FeatureKind::surface, map.planes, pose, config,
+                       found.subspan(edges + planes));
+}
+
+RegistrationConfig limits_for(const FeatureSets& features, RegistrationConfig limits) {
+  if (!features.sparse_rings) return limits;
+  limits.neighbours = limits.sparse_ring_neighbours;
+  limits.min_plane_width = limits.sparse_ring_plane_width;
+  limits.plane_deviation_m = limits.sparse_ring_plane_deviation_m;
+  limits.across_rings_weight = 0.0;
+  return limits;
+}
+
 /// Sum of w s s' over slopes s, in columns of eight numbers: whole vector registers.
 class InformationSum {
  public:
@@ -358,33 +385,19 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
                                  const Eigen::Isometry3d& T_map_lidar_predicted,
                                  const OdometryConfig& config,
                                  const SweepCorrection& sweep_correction) {
-  RegistrationConfig limits = config.registration;
-  if (features.sparse_rings) {
-    limits.neighbours = limits.sparse_ring_neighbours;
-    limits.min_plane_width = limits.sparse_ring_plane_width;
-    limits.plane_deviation_m = limits.sparse_ring_plane_deviation_m;
-    limits.across_rings_weight = 0.0;
-  }
+  const RegistrationConfig limits = limits_for(features, config.registration);
   OdometryResult result;
   result.T_map_lidar = T_map_lidar_predicted;
   result.sweep_correction = sweep_correction;
   const bool rolling = features.rolling && limits.sweep_translation_m > 0.0;
-  const std::size_t edge_count = features.edges.size();
-  const std::size_t plane_count = features.planes.size();
-  std::vector<Correspondence> correspondences(edge_count + plane_count + features.surfaces.size());
-  const std::span all(correspondences);
+  std::vector<Correspondence> correspondences(count_of(features));
   NormalEquations equations;
   bool degenerate = false;
   bool weighs_planes = false;
   for (; result.iterations < limits.max_iterations && !result.converged; ++result.iterations) {
-    find_correspondences(features.edges, FeatureKind::edge, map.edges, result, limits,
-                         all.first(edge_count));
-    find_correspondences(features.planes, FeatureKind::plane, map.planes, result, limits,
-                         all.subspan(edge_count, plane_count));
-    find_correspondences(features.surfaces, FeatureKind::surface, map.planes, result, limits,
-                         all.subspan(edge_count + plane_count));
-    equations = build_normal_equations(correspondences, edge_count, rolling, weighs_planes,
-                                       result.T_map_lidar, config);
+    find_all_correspondences(features, map, result, limits, correspondences);
+    equations = build_normal_equations(correspondences, features.edges.size(), rolling,
+                                       weighs_planes, result.T_map_lidar, config);
     if (equations.count() < limits.min_correspondences) break;
     const Eigen::Isometry3d before = result.T_map_lidar;
     degenerate = take_step(rolling ? &features.sweep_prior : nullptr, limits, equations, result);
@@ -392,7 +405,7 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
     weighs_planes = is_small(boxminus(result.T_map_lidar, before), near_steps, limits);
     if (weighs_planes) result.converged = false;
   }
-  take_fit(all, equations, result);
+  take_fit(correspondences, equations, result);
   if (equations.count() < limits.min_correspondences || !result.T_map_lidar.matrix().allFinite()) {
     OdometryResult lost = lost_at(T_map_lidar_predicted);
     lost.iterations = result.iterations;
@@ -403,6 +416,27 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
       std::sqrt(equations.weighted_squares / std::max(equations.weights, least_weights));
   result.covariance = ErrorDirections(equations, limits.min_observability).covariance();
   return result;
+}
+
+double counted_fit(const FeatureSets& features, const LocalMap& map,
+                   const Eigen::Isometry3d& T_map_lidar, const OdometryConfig& config,
+                   const SweepCorrection& sweep_correction) {
+  OdometryResult pose;
+  pose.T_map_lidar = T_map_lidar;
+  pose.sweep_correction = sweep_correction;
+  std::vector<Correspondence> correspondences(count_of(features));
+  find_all_correspondences(features, map, pose, limits_for(features, config.registration),
+                           correspondences);
+  double scores = 0.0;
+  for (const Correspondence& c : correspondences) {
+    if (!c.found) continue;
+    const Residual r = residual(c.point_lidar, T_map_lidar, c.surface);
+    double squared = 0.0;
+    for (std::size_t k = 0; k < r.count; ++k)
+      squared += c.surface.weights[k] * r.distances[k] * r.distances[k];
+    scores += geman_mcclure(fit_scale_m, squared);
+  }
+  return scores / std::max(1.0, static_cast<double>(correspondences.size()));
 }
 
 OdometryResult register_in_two_stages(const FeatureSets& features, const LocalMap& map,

@@ -82,8 +82,16 @@ struct LocalMap {
                                                const OdometryConfig& config,
                                                const SweepCorrection& sweep_correction = {});
 
-/// The same in two stages: to convergence with weight 1 and no kernel, which would throw away
-/// exactly the residuals that a bad prediction makes, then to convergence with the weights.
+/// How well a scan lies on the map at a pose that is not moved: OdometryResult::fit by those
+/// distances alone that count (FittedSurface::weights), 0..1. Rings on level ground lie well
+/// wherever the lidar is, and leave it as it is.
+[[nodiscard]] double counted_fit(const FeatureSets& features, const LocalMap& map,
+                                 const Eigen::Isometry3d& T_map_lidar, const OdometryConfig& config,
+                                 const SweepCorrection& sweep_correction = {});
+
+/// The same as register_features in two stages: to convergence with weight 1 and no kernel, which
+/// would throw away exactly the residuals that a bad prediction makes, then to convergence with the
+/// weights.
 [[nodiscard]] OdometryResult register_in_two_stages(const FeatureSets& features,
                                                     const LocalMap& map,
                                                     const Eigen::Isometry3d& T_map_lidar_predicted,

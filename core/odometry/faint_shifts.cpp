@@ -1,0 +1,47 @@
+#include "core/odometry/faint_shifts.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <optional>
+
+namespace stillmap {
+namespace {
+
+/// A shift is faint where no more than this share of the residuals see it.
+constexpr double max_faint_share = 0.05;
+/// So far to either side [m]: the local map's points are 0.2 m apart, and the neighbours there are
+/// others.
+constexpr double beside_m = 0.3;
+/// Share of the features that must lie worse there.
+constexpr double min_fit_lost = 0.005;
+
+/// Direction of the shift that the scan shows least, along the map's axes.
+std::optional<Eigen::Vector3d> faint_shift(const OdometryResult& found) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> shifts(
+      found.covariance.topLeftCorner<3, 3>());
+  // The covariance is what the residuals scatter over what sees the shift.
+  const double freedom =
+      std::max(1.0, 2.0 * found.edge_correspondences + found.plane_correspondences - 6.0);
+  const double share =
+      found.rms_residual_m * found.rms_residual_m / (freedom * shifts.eigenvalues()[2]);
+  if (share > max_faint_share) return std::nullopt;
+  return shifts.eigenvectors().col(2);
+}
+
+}  // namespace
+
+OdometryResult doubted_where_shift_fits(OdometryResult found, const FeatureSets& features,
+                                        const LocalMap& map, const OdometryConfig& config) {
+  if (config.paper_exact || found.health != OdometryHealth::good) return found;
+  const auto shift_map = faint_shift(found);
+  if (!shift_map) return found;
+  const auto fit_at = [&](double way_m) {
+    return counted_fit(features, map, Eigen::Translation3d(way_m * *shift_map) * found.T_map_lidar,
+                       config, found.sweep_correction);
+  };
+  const double fit_beside = 0.5 * (fit_at(-beside_m) + fit_at(beside_m));
+  if (fit_at(0.0) - fit_beside < min_fit_lost) found.health = OdometryHealth::degenerate;
+  return found;
+}
+
+}  // namespace stillmap

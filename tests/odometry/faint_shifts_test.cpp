@@ -1,0 +1,85 @@
+#include "core/odometry/faint_shifts.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "core/odometry/scan_features.hpp"
+#include "tests/odometry/poses.hpp"
+
+namespace stillmap {
+namespace {
+
+/// Points of a passage of 6 m by 4 m round the lidar, 80 m long, with noise; with a wall across it
+/// 20 m ahead of the map's origin, or without an end.
+FeatureSets passage(double lidar_x_m, bool has_end, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> along(-40.0F, has_end ? 20.0F : 40.0F);
+  std::uniform_real_distribution<float> unit(-1.0F, 1.0F);
+  std::normal_distribution<float> noise(0.0F, 0.03F);
+  FeatureSets sets;
+  const auto add = [&](float x, float y, float z) {
+    const Eigen::Vector3f p(x + noise(random), y + noise(random), z + noise(random));
+    sets.surfaces.push_back(
+        {.position_lidar = p - Eigen::Vector3f(static_cast<float>(lidar_x_m), 0.0F, 0.0F)});
+  };
+  for (int k = 0; k < 800; ++k) {
+    add(along(random), k % 2 == 0 ? 3.0F : -3.0F, 2.0F * unit(random));
+    add(along(random), 3.0F * unit(random), k % 2 == 0 ? 2.0F : -2.0F);
+    if (has_end && k < 100) add(20.0F, 3.0F * unit(random), 2.0F * unit(random));
+  }
+  return sets;
+}
+
+LocalMap map_of(bool has_end) {
+  LocalMap map{LocalMapConfig{}};
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    FeatureSets sets;
+    sets.planes = passage(0.0, has_end, seed).surfaces;
+    extend_local_map(map, sets, Eigen::Isometry3d::Identity(), {});
+  }
+  return map;
+}
+
+OdometryResult registered(const FeatureSets& features, const LocalMap& map,
+                          const OdometryConfig& config) {
+  OdometryResult found = register_features(features, map, test::level_pose(1.0, 0.0, 0.0), config);
+  // The noise of normals may be more or less than looks like a view.
+  if (found.health == OdometryHealth::degenerate) found.health = OdometryHealth::good;
+  return found;
+}
+
+TEST(FaintShifts, APassageWithoutAnEndIsDegenerateHoweverItsNormalsLean) {
+  const LocalMap map = map_of(/*has_end=*/false);
+  const FeatureSets features = passage(1.0, /*has_end=*/false, 77);
+  const OdometryConfig config;
+  const OdometryResult found = registered(features, map, config);
+  ASSERT_EQ(found.health, OdometryHealth::good);
+  const OdometryResult doubted = doubted_where_shift_fits(found, features, map, config);
+  EXPECT_EQ(doubted.health, OdometryHealth::degenerate);
+  EXPECT_TRUE(doubted.T_map_lidar.isApprox(found.T_map_lidar)) << "it is not moved";
+}
+
+TEST(FaintShifts, AWallAcrossItShowsTheWay) {
+  const LocalMap map = map_of(/*has_end=*/true);
+  const FeatureSets features = passage(1.0, /*has_end=*/true, 77);
+  const OdometryConfig config;
+  const OdometryResult found = registered(features, map, config);
+  EXPECT_NEAR(found.T_map_lidar.translation().x(), 1.0, 0.02);
+  EXPECT_EQ(doubted_where_shift_fits(found, features, map, config).health, OdometryHealth::good);
+}
+
+TEST(FaintShifts, ThePapersMethodAndWhatIsLostStayAsTheyAre) {
+  const LocalMap map = map_of(/*has_end=*/false);
+  const FeatureSets features = passage(1.0, /*has_end=*/false, 77);
+  OdometryConfig paper;
+  paper.paper_exact = true;
+  const OdometryResult found = registered(features, map, paper);
+  EXPECT_EQ(doubted_where_shift_fits(found, features, map, paper).health, OdometryHealth::good);
+  const OdometryResult lost = lost_at(found.T_map_lidar);
+  EXPECT_EQ(doubted_where_shift_fits(lost, features, map, OdometryConfig{}).health,
+            OdometryHealth::lost);
+}
+
+}  // namespace
+}  // namespace stillmap
