@@ -184,6 +184,8 @@ def parse(words):
     parser.add_argument("--against", metavar="NAME=PROGRAM", type=named_program, action="append", default=[],
                         help="Another odometry: PROGRAM SEQUENCE OUT writes OUT/poses_lidar.txt and OUT/ms.txt")
     parser.add_argument("--only", default="", help="Run only what has this in its name or group; the page keeps the others")
+    parser.add_argument("--weightings", nargs="+", choices=suite.WEIGHTINGS, default=suite.WEIGHTINGS,
+                        help="These alone")
     parser.add_argument("--quick", action="store_true", help="2 seeds of 60 scans")
     parser.add_argument("--fresh", action="store_true", help="Run what is finished again")
     parser.add_argument("--list", action="store_true", help="Print the runs' names")
@@ -197,7 +199,8 @@ def main(words):
     extent = suite.Extent.quick() if arguments.quick else suite.Extent()
     arguments.results.mkdir(parents=True, exist_ok=True)
     avia = with_poses(arguments.recordings, arguments.results) if arguments.recordings else None
-    everything = suite.suite(extent, arguments.recordings, avia, arguments.against)
+    everything = list(suite.weighed(suite.suite(extent, arguments.recordings, avia, arguments.against),
+                                    arguments.weightings))
     runs = [run for run in everything if arguments.only in run.name or arguments.only in run.group]
     if arguments.list:
         print("\n".join(run.name for run in runs))

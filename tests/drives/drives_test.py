@@ -53,6 +53,14 @@ class Suite(unittest.TestCase):
             names = [run.name for run in suite.suite(extent, programs=[("other", "/bin/other")])]
             self.assertEqual(len(names), len(set(names)))
 
+    def test_takes_the_weightings_that_are_asked_for(self):
+        programs = [("other", "/bin/other")]
+        runs = list(suite.weighed(suite.suite(suite.Extent.quick(), programs=programs), ["none", "geometric"]))
+        self.assertEqual({run.weightings for run in runs}, {("none", "geometric"), ("other",)})
+        self.assertFalse([run for run in runs if run.mutation != "none"], "mutated ones are semantic")
+        self.assertEqual(list(suite.weighed(suite.suite(suite.Extent.quick()), suite.WEIGHTINGS)),
+                         suite.suite(suite.Extent.quick()))
+
     def test_covers_weightings_labels_sensors_sweeps_and_mutations(self):
         runs = suite.suite(suite.Extent())
         self.assertEqual({weighting for run in runs for weighting in run.weightings}, set(suite.WEIGHTINGS))

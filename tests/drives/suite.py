@@ -125,3 +125,11 @@ def suite(extent, recordings=None, avia=None, programs=()):
         runs += [dataclasses.replace(run, weightings=(program[0],), labels="none", program=program)
                  for run in drives.values()]
     return runs
+
+
+def weighed(runs, weightings):
+    """The runs with these weightings alone; those of other programs have none of them."""
+    for run in runs:
+        chosen = run.weightings if run.program else tuple(w for w in run.weightings if w in weightings)
+        if chosen:
+            yield dataclasses.replace(run, weightings=chosen)
