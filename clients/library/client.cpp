@@ -382,7 +382,7 @@ Subscription Client::subscribe_region(const Region& region,
   const RegionShape shape(region);
   Connection& connection = *connection_;
   return make_region_subscription(
-      connection.participant, connection.topics.tile_index, region,
+      connection.participant, connection.topics, region,
       [&connection, box_map = shape.bounds_map()] { return connection.list_tiles(box_map); },
       [&connection](std::span<const TileId> ids) { return connection.fetch_tiles(ids); },
       std::move(update_arrived));

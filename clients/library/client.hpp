@@ -250,8 +250,8 @@ class Client {
   /// The tiles whose footprint meets the region: first those that exist, then what changes. Tiles
   /// outside of it do not come over the network, only their entries in the index (some 100
   /// bytes), which this process ignores. When another map begins, the tiles of the last one are
-  /// removed. Throws std::invalid_argument for a region with faults, and as a request does: it asks
-  /// for the size of tiles, so a server that restarts with another size needs a new subscription.
+  /// removed, some two seconds later where it has none here; its tiles may have another edge.
+  /// Throws std::invalid_argument for a region with faults, and as a request does.
   [[nodiscard]] Subscription subscribe_region(
       const Region& region, std::function<void(const RegionUpdate&)> update_arrived);
 

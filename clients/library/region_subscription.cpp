@@ -1,12 +1,15 @@
 #include "clients/library/region_subscription.hpp"
 
 #include <chrono>
+#include <memory>
 #include <optional>
 #include <thread>
 #include <utility>
 
 #include "core/map/voxel_grid.hpp"
+#include "idl/conversions/status.hpp"
 #include "idl/conversions/tile.hpp"
+#include "idl/dds/dds_error.hpp"
 #include "idl/dds/reader.hpp"
 
 namespace stillmap {
@@ -33,29 +36,60 @@ RegionTracker tracker_of(const Region& region, const TileVersions& present) {
   return tracker;
 }
 
-/// The reader of a region's part of the index, and the thread that turns entries into updates.
+/// The readers of a region's part of the index and of the status, and the thread that turns what
+/// they bring into updates.
 class RegionReceiver final : public Subscription::Receiver {
  public:
-  RegionReceiver(dds::Participant& participant,
-                 const dds::TopicSpec<stillmap_msgs::msg::TileInfo>& index, const Region& region,
+  RegionReceiver(dds::Participant& participant, const dds::Topics& topics, const Region& region,
                  const TileVersions& present, ListTiles list, FetchTiles fetch,
                  std::function<void(const RegionUpdate&)> update_arrived)
-      : tracker_(tracker_of(region, present)),
+      : participant_(participant),
+        topic_(topics.tile_index),
+        region_(region),
+        tracker_(tracker_of(region, present)),
         list_(std::move(list)),
         fetch_(std::move(fetch)),
         update_arrived_(std::move(update_arrived)),
-        reader_(participant, index.dds_name, index.reader,
-                filter_for(region, present.map.tile_size_m)),
+        index_tile_size_m_(tracker_.tile_size_m()),
+        index_(open_index()),
+        status_(participant, topics.status.dds_name, topics.status.reader),
         thread_([this](const std::stop_token& stop) { receive(stop); }) {}
 
  private:
+  using IndexReader = dds::Reader<stillmap_msgs::msg::TileInfo>;
+
   void receive(const std::stop_token& stop) {
     // What is there already first; later what the index tells.
     if (tracker_.has_update()) deliver_update();
     while (!stop.stop_requested()) {
       collect_entries(stop);
+      note_map(stop);
       if (tracker_.lacks_present() && !stop.stop_requested()) list_present();
+      follow_tile_size();
       if (tracker_.has_update() && !stop.stop_requested()) deliver_update();
+    }
+  }
+
+  [[nodiscard]] std::unique_ptr<IndexReader> open_index() const {
+    return std::make_unique<IndexReader>(participant_, topic_.dds_name, topic_.reader,
+                                         filter_for(region_, tracker_.tile_size_m()));
+  }
+
+  void note_map(const std::stop_token& stop) {
+    while (status_.take(status_sample_, stop, 0ms)) {
+      if (const auto status = wire::from_wire(status_sample_)) tracker_.note_map(status->map_id);
+    }
+  }
+
+  /// The filter tells tiles by their indices, which mean other places where tiles have another
+  /// edge.
+  void follow_tile_size() {
+    if (tracker_.tile_size_m() == index_tile_size_m_) return;
+    try {
+      index_ = open_index();
+      index_tile_size_m_ = tracker_.tile_size_m();
+    } catch (const dds::DdsError&) {
+      // The one of before stays until the next attempt.
     }
   }
 
@@ -63,9 +97,9 @@ class RegionReceiver final : public Subscription::Receiver {
   void collect_entries(const std::stop_token& stop) {
     auto pause = std::chrono::milliseconds(1s);
     std::optional<Clock::time_point> first;
-    while (reader_.take(sample_, stop, pause)) {
-      if (const auto info = wire::from_wire(sample_)) {
-        tracker_.add_index_entry(wire::from_wire(sample_.identity()), *info);
+    while (index_->take(entry_, stop, pause)) {
+      if (const auto info = wire::from_wire(entry_)) {
+        tracker_.add_index_entry(wire::from_wire(entry_.identity()), *info);
       }
       if (!first) first = Clock::now();
       if (Clock::now() - *first > max_batch_duration) return;
@@ -98,12 +132,19 @@ class RegionReceiver final : public Subscription::Receiver {
     }
   }
 
+  dds::Participant& participant_;
+  dds::TopicSpec<stillmap_msgs::msg::TileInfo> topic_;
+  Region region_;
   RegionTracker tracker_;
   ListTiles list_;
   FetchTiles fetch_;
   std::function<void(const RegionUpdate&)> update_arrived_;
-  stillmap_msgs::msg::TileInfo sample_;
-  dds::Reader<stillmap_msgs::msg::TileInfo> reader_;
+  /// That of the index's filter [m].
+  double index_tile_size_m_;
+  stillmap_msgs::msg::TileInfo entry_;
+  std::unique_ptr<IndexReader> index_;
+  stillmap_msgs::msg::Status status_sample_;
+  dds::Reader<stillmap_msgs::msg::Status> status_;
   // Last: stops before what it uses is gone.
   std::jthread thread_;
 };
@@ -111,8 +152,7 @@ class RegionReceiver final : public Subscription::Receiver {
 }  // namespace
 
 void RegionTracker::add_index_entry(const dds::MapIdentity& map, const TileInfo& info) {
-  if (map.map_id != map_.map_id) clear();
-  map_ = map;
+  begin_map(map);
   if (!region_.may_intersect(tile_footprint(info.id, tile_size_m_))) return;
   if (info.voxel_count == 0) return remove(info.id);
   const auto known = known_.find(info.id);
@@ -120,16 +160,27 @@ void RegionTracker::add_index_entry(const dds::MapIdentity& map, const TileInfo&
 }
 
 void RegionTracker::add_present(const TileVersions& present) {
-  if (present.map.map_id != map_.map_id) clear();
-  map_ = present.map;
+  begin_map(present.map);
   listed_map_id_ = present.map.map_id;
+  is_other_map_noted_ = false;
   for (const TileInfo& info : present.tiles) add_index_entry(present.map, info);
 }
 
-void RegionTracker::clear() {
-  for (const auto& [id, revision] : known_) removed_.insert(id);
-  known_.clear();
-  pending_.clear();
+void RegionTracker::note_map(std::uint64_t map_id) {
+  // Each counts once: the status that is kept for late joiners may be older than the list.
+  if (std::exchange(noted_map_id_, map_id) == map_id) return;
+  is_other_map_noted_ = map_id != listed_map_id_;
+}
+
+void RegionTracker::begin_map(const dds::MapIdentity& map) {
+  if (map.map_id != map_.map_id) {
+    for (const auto& [id, revision] : known_) removed_.insert(id);
+    known_.clear();
+    pending_.clear();
+    // Also not where it is no number.
+    if (map.tile_size_m > 0.0) tile_size_m_ = map.tile_size_m;
+  }
+  map_ = map;
 }
 
 void RegionTracker::remove(TileId id) {
@@ -154,12 +205,11 @@ RegionUpdate RegionTracker::take_update(TileSet fetched) {
   return update;
 }
 
-Subscription make_region_subscription(dds::Participant& participant,
-                                      const dds::TopicSpec<stillmap_msgs::msg::TileInfo>& index,
+Subscription make_region_subscription(dds::Participant& participant, const dds::Topics& topics,
                                       const Region& region, ListTiles list, FetchTiles fetch,
                                       std::function<void(const RegionUpdate&)> update_arrived) {
   const TileVersions present = list();
-  return Subscription(std::make_unique<RegionReceiver>(participant, index, region, present,
+  return Subscription(std::make_unique<RegionReceiver>(participant, topics, region, present,
                                                        std::move(list), std::move(fetch),
                                                        std::move(update_arrived)));
 }

@@ -22,13 +22,22 @@ class RegionTracker {
   RegionTracker(const Region& region, double tile_size_m)
       : region_(region), tile_size_m_(tile_size_m) {}
 
-  /// An entry of a tile that was fetched in this state, or a newer one, changes nothing.
+  /// An entry of a tile that was fetched in this state, or a newer one, changes nothing. One of
+  /// another map ends the map before, whatever edge its tiles have.
   void add_index_entry(const dds::MapIdentity& map, const TileInfo& info);
   /// All tiles of the region.
   void add_present(const TileVersions& present);
-  /// Whether another map began since then: the index has only tiles of it that are round the robot,
-  /// or changed.
-  [[nodiscard]] bool lacks_present() const { return listed_map_id_ != map_.map_id; }
+  /// Which map there is, as the server's status tells: the index may never speak of one that has no
+  /// tile here.
+  void note_map(std::uint64_t map_id);
+  /// Whether another map began since `add_present`: the index has only tiles of it that are round
+  /// the robot, or changed.
+  [[nodiscard]] bool lacks_present() const {
+    return is_other_map_noted_ || listed_map_id_ != map_.map_id;
+  }
+
+  /// Edge of the map's tiles [m].
+  [[nodiscard]] double tile_size_m() const { return tile_size_m_; }
 
   /// Tiles that changed and are not fetched yet.
   [[nodiscard]] std::vector<TileId> pending() const { return {pending_.begin(), pending_.end()}; }
@@ -39,13 +48,15 @@ class RegionTracker {
   [[nodiscard]] RegionUpdate take_update(TileSet fetched);
 
  private:
-  void clear();
+  void begin_map(const dds::MapIdentity& map);
   void remove(TileId id);
 
   RegionShape region_;
   double tile_size_m_;
   dds::MapIdentity map_;
   std::uint64_t listed_map_id_ = 0;
+  std::uint64_t noted_map_id_ = 0;
+  bool is_other_map_noted_ = false;
   /// With their revisions.
   std::map<TileId, std::uint64_t> known_;
   std::set<TileId> pending_;
@@ -55,13 +66,13 @@ class RegionTracker {
 using FetchTiles = std::function<TileSet(std::span<const TileId>)>;
 using ListTiles = std::function<TileVersions()>;
 
-/// A reader of the region's part of the tile index, and the thread that makes updates of its
-/// entries, fetching changed tiles. `list` tells the region's tiles: the first update has them,
-/// and that of another map, since the index has but those round the robot. Throws what `list`
-/// throws; later `list` and `fetch` may throw ServiceError, and are then called again.
+/// A reader of the region's part of the tile index, one of the status, which tells when another map
+/// began, and the thread that makes updates of the entries, fetching changed tiles. `list` tells
+/// the region's tiles: the first update has them, and that of another map, since the index has but
+/// those round the robot. Throws what `list` throws; later `list` and `fetch` may throw
+/// ServiceError, and are then called again.
 [[nodiscard]] Subscription make_region_subscription(
-    dds::Participant& participant, const dds::TopicSpec<stillmap_msgs::msg::TileInfo>& index,
-    const Region& region, ListTiles list, FetchTiles fetch,
-    std::function<void(const RegionUpdate&)> update_arrived);
+    dds::Participant& participant, const dds::Topics& topics, const Region& region, ListTiles list,
+    FetchTiles fetch, std::function<void(const RegionUpdate&)> update_arrived);
 
 }  // namespace stillmap

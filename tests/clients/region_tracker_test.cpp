@@ -110,6 +110,49 @@ TEST(RegionTracker, LacksWhatTheIndexOfAnotherMapDoesNotHave) {
   EXPECT_EQ(tracker.take_update(tiles(second_map, {{0, 0}, {1, 0}})).changed.size(), 2U);
 }
 
+TEST(RegionTracker, LacksWhatAMapHasThatTheIndexNeverSpeaksOf) {
+  RegionTracker tracker = two_tiles();
+  tracker.note_map(1);
+  tracker.add_present({.map = first_map, .tiles = {info({0, 0}), info({1, 0})}});
+  (void)tracker.take_update(tiles(first_map, {{0, 0}, {1, 0}}));
+  tracker.note_map(1);
+  EXPECT_FALSE(tracker.lacks_present());
+  // A reset: no tile of the new map is here, nor round the robot yet.
+  tracker.note_map(2);
+  EXPECT_TRUE(tracker.lacks_present());
+  tracker.add_present({.map = second_map, .tiles = {}});
+  EXPECT_FALSE(tracker.lacks_present());
+  ASSERT_TRUE(tracker.has_update());
+  const RegionUpdate update = tracker.take_update({});
+  EXPECT_EQ(update.map.map_id, 2U);
+  EXPECT_THAT(update.removed, ElementsAre(TileId{0, 0}, TileId{1, 0}));
+}
+
+TEST(RegionTracker, AStatusThatIsOlderThanTheListIsBelievedOnce) {
+  RegionTracker tracker = two_tiles();
+  tracker.add_present({.map = second_map, .tiles = {info({0, 0})}});
+  tracker.note_map(1);
+  EXPECT_TRUE(tracker.lacks_present());
+  tracker.add_present({.map = second_map, .tiles = {info({0, 0})}});
+  tracker.note_map(1);
+  tracker.note_map(2);
+  EXPECT_FALSE(tracker.lacks_present());
+  EXPECT_THAT(tracker.pending(), ElementsAre(TileId{0, 0}));
+}
+
+TEST(RegionTracker, TilesOfAnotherMapMayHaveAnotherEdge) {
+  RegionTracker tracker = two_tiles();
+  tracker.add_index_entry(first_map, info({0, 0}));
+  (void)tracker.take_update(tiles(first_map, {{0, 0}}));
+  dds::MapIdentity finer = second_map;
+  finer.tile_size_m = 10.0;
+  // 20 to 30 m along x, and 10 to 20 m: the region ends at 37 m.
+  for (const TileId id : {TileId{2, 1}, {3, 1}, {4, 1}}) tracker.add_index_entry(finer, info(id));
+  EXPECT_EQ(tracker.tile_size_m(), 10.0);
+  EXPECT_THAT(tracker.pending(), ElementsAre(TileId{2, 1}, TileId{3, 1}));
+  EXPECT_THAT(tracker.take_update({}).removed, ElementsAre(TileId{0, 0}));
+}
+
 TEST(RegionTracker, LeavesTilesOfAMapThatTheIndexHasNotSpokenOf) {
   RegionTracker tracker = two_tiles();
   tracker.add_index_entry(first_map, info({0, 0}));

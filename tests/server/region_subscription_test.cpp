@@ -1,7 +1,9 @@
 #include <gmock/gmock.h>
+#include <signal.h>
 
 #include <map>
 #include <mutex>
+#include <optional>
 
 #include "core/map/query/region.hpp"
 #include "core/map/voxel_grid.hpp"
@@ -53,8 +55,19 @@ class RegionCopy {
 
 class RegionSubscription : public testing::Test {
  protected:
-  RegionSubscription()
-      : setup_("every"), server_(setup_.server_arguments()), client_(setup_.client()) {
+  RegionSubscription() : setup_("every"), client_(setup_.client()) {
+    server_.emplace(setup_.server_arguments());
+    client_.wait_for_server(patience);
+  }
+
+  /// Ends the server and starts another one with an empty map, its file with these sections, too.
+  void restart(const std::string& yaml) {
+    server_->send(SIGTERM);
+    ASSERT_EQ(server_->wait_for_exit(patience), 0);
+    setup_.add(yaml);
+    std::vector<std::string> arguments = setup_.server_arguments();
+    arguments.insert(arguments.end(), {"--map-file", (folder_ / "other.stillmap").string()});
+    server_.emplace(arguments);
     client_.wait_for_server(patience);
   }
 
@@ -83,7 +96,8 @@ class RegionSubscription : public testing::Test {
   }
 
   ServiceSetup setup_;
-  ServerProcess server_;
+  ScratchFolder folder_;
+  std::optional<ServerProcess> server_;
   Client client_;
   ScanPublisher publisher_{setup_.publisher(true)};
   RegionShape shape_{Region(corner)};
@@ -113,6 +127,24 @@ TEST_F(RegionSubscription, ComesLateAndSeesAResetTakeItsTiles) {
   drive(publisher_, 0, 6);
   ASSERT_TRUE(wait_for_scans(client_, 12));
   expect_only_the_region(copy);
+}
+
+TEST_F(RegionSubscription, LosesItsTilesWhereAServerBeginsAnotherMap) {
+  drive(publisher_, 0, 6);
+  ASSERT_TRUE(wait_for_scans(client_, 6));
+  RegionCopy copy;
+  const auto subscription =
+      client_.subscribe_region(corner, [&](const RegionUpdate& update) { copy.add(update); });
+  expect_only_the_region(copy);
+  // Until a scan comes, the new process has no tile to speak of.
+  restart("static_map: {tile_size_m: 10}\n");
+  EXPECT_TRUE(eventually([&] { return copy.hashes().empty(); }));
+  drive(publisher_, 0, 6);
+  ASSERT_TRUE(wait_for_scans(client_, 6));
+  EXPECT_EQ(client_.get_tile_versions().map.tile_size_m, 10.0);
+  EXPECT_TRUE(eventually([&] { return copy.hashes() == served().first; }));
+  // In tiles of 20 m, x is -2.
+  EXPECT_TRUE(copy.hashes().contains({-3, -1}));
 }
 
 TEST_F(RegionSubscription, RefusesARegionWithFaults) {
