@@ -14,10 +14,10 @@ namespace {
 constexpr std::uint32_t new_tile_share = 2;
 
 /// About what the tile's message has on the wire.
-std::size_t message_bytes(const Tile& tile) {
+std::size_t message_bytes(const TileInfo& tile) {
   constexpr std::size_t bytes_per_voxel = 27;
   constexpr std::size_t head_bytes = 150;
-  return head_bytes + bytes_per_voxel * tile.voxels.size();
+  return head_bytes + bytes_per_voxel * tile.voxel_count;
 }
 
 }  // namespace
@@ -47,7 +47,7 @@ void TilePublisher::publish(const std::shared_ptr<const MapSnapshot>& latest,
       view.tile_size_m > 0.0 ? tile_range({centre_map - half, centre_map + half}, view.tile_size_m)
                              : TileRange{};
   const bool is_same_window = window.first == window_.first && window.last == window_.last;
-  if (latest == last_view_ && is_same_window && pending_.empty() && gone_.empty()) return;
+  if (latest == last_view_ && is_same_window && waiting() == 0) return;
   const dds::MapIdentity identity = wire::identity_of(view);
   window_ = window;
   const bool is_other_map = !last_view_ || view.map_id != last_view_->map_id;
@@ -60,8 +60,10 @@ void TilePublisher::publish(const std::shared_ptr<const MapSnapshot>& latest,
 void TilePublisher::begin_map(const MapSnapshot& view) {
   pending_.clear();
   gone_.clear();
+  undisposed_.clear();
   for (auto& [id, known] : published_) {
     known.revision = 0;
+    known.entry.reset();
     (view.tiles.find(id) == nullptr ? gone_ : pending_).insert(id);
   }
 }
@@ -75,6 +77,7 @@ void TilePublisher::note_changes(const MapSnapshot& view) {
         } else if (before == nullptr || before->info.revision != after->info.revision) {
           // Tiles that were evicted or reloaded are the same to readers.
           gone_.erase(after->info.id);
+          undisposed_.erase(after->info.id);
           pending_.insert(after->info.id);
         }
       });
@@ -108,14 +111,17 @@ TilePublisher::TilePointers TilePublisher::pending_tiles(const MapSnapshot& view
 }
 
 void TilePublisher::publish_pending(const MapSnapshot& view, const dds::MapIdentity& identity) {
-  if (!last_burst_acknowledged()) return;
-  for (const TileId id : std::exchange(gone_, {})) publish_gone(id, view, identity);
-  release_far_tiles(identity);
+  for (const TileId id : std::exchange(gone_, {})) announce_gone(id, view, identity);
+  const bool may_send = last_burst_acknowledged();
+  if (may_send) {
+    dispose_gone(view, identity);
+    release_far_tiles(identity);
+  }
   if (pending_.empty()) return;
-  last_burst_ = std::chrono::steady_clock::now();
+  if (may_send) last_burst_ = std::chrono::steady_clock::now();
   for (const auto& tile : pending_tiles(view)) {
     if (!token_bucket_.has_tokens()) return;
-    publish_tile(tile, identity);
+    may_send ? publish_tile(tile, identity) : announce(tile->info, identity);
   }
 }
 
@@ -131,25 +137,41 @@ void TilePublisher::publish_tile(const std::shared_ptr<const Tile>& tile,
   try {
     const auto whole = reader_.read(tile);
     static_cast<void>(tiles_.write(wire::to_wire(*whole, identity)));
-    token_bucket_.consume(message_bytes(*whole));
+    token_bucket_.consume(message_bytes(whole->info));
   } catch (const std::runtime_error&) {
     // On the disk, and changed since or not to be read now: the entry alone. The tile follows when
     // it changes, or is in the window when that moves.
     revision = 0;
   }
   static_cast<void>(index_.write(wire::to_wire(tile->info, identity)));
-  published_[tile->info.id] = {revision, ++publications_};
+  published_[tile->info.id] = {revision, ++publications_, tile->info.revision};
   pending_.erase(tile->info.id);
 }
 
-void TilePublisher::publish_gone(TileId id, const MapSnapshot& view,
-                                 const dds::MapIdentity& identity) {
-  Tile gone;
-  gone.info = {.id = id, .revision = view.version, .bounds_map = {}};
-  if (published_.contains(id)) tiles_.dispose(wire::to_wire(gone, identity));
+void TilePublisher::announce(const TileInfo& info, const dds::MapIdentity& identity) {
+  Published& known = published_[info.id];
+  if (known.entry == info.revision) return;
+  known.entry = info.revision;
+  static_cast<void>(index_.write(wire::to_wire(info, identity)));
+  // Those who follow the index now ask for the voxels.
+  token_bucket_.consume(message_bytes(info));
+}
+
+void TilePublisher::announce_gone(TileId id, const MapSnapshot& view,
+                                  const dds::MapIdentity& identity) {
+  const TileInfo gone{.id = id, .revision = view.version, .bounds_map = {}};
   // Disposed samples do not pass content filters: the index says it with an empty tile.
-  static_cast<void>(index_.write(wire::to_wire(gone.info, identity)));
-  published_[id] = {0, ++publications_};
+  static_cast<void>(index_.write(wire::to_wire(gone, identity)));
+  if (published_.contains(id)) undisposed_.insert(id);
+  published_[id] = {0, ++publications_, std::nullopt};
+}
+
+void TilePublisher::dispose_gone(const MapSnapshot& view, const dds::MapIdentity& identity) {
+  for (const TileId id : std::exchange(undisposed_, {})) {
+    Tile gone;
+    gone.info = {.id = id, .revision = view.version, .bounds_map = {}};
+    tiles_.dispose(wire::to_wire(gone, identity));
+  }
 }
 
 void TilePublisher::release_far_tiles(const dds::MapIdentity& identity) {

@@ -40,15 +40,17 @@ class TokenBucket {
 };
 
 /// Publishes the tiles in a window round the robot, and every tile that changes: first its voxels
-/// and then its entry in the index. Tiles that no longer exist are disposed, and their entry
-/// becomes empty. Late joiners get the window and the tiles that changed last elsewhere, however
-/// large the map is; the rest is theirs to ask for. Where the participant's options limit the rate
-/// of large messages, new tiles take half of it: those published longest ago go first, and a tile
-/// that changes while it waits is sent once, in its newest state.
+/// and then its entry in the index. The entry of a tile that no longer exists becomes empty, and
+/// the tile is disposed. Late joiners get the window and the tiles that changed last elsewhere,
+/// however large the map is; the rest is theirs to ask for. Where the participant's options limit
+/// the rate of large messages, new tiles take half of it: those published longest ago go first, and
+/// a tile that changes while it waits is sent once, in its newest state.
 ///
 /// A tile is never replaced or disposed while a reader is still receiving it (unless that takes
 /// longer than a lease): Fast DDS 2.9 readers abort when they have some fragments of a keyed sample
-/// and are then told that the rest will not come.
+/// and are then told that the rest will not come. Entries do not wait for that: a reader of tiles
+/// that was stopped would keep them from all others. The entry of a tile that waits is written at
+/// once, and again after its voxels; it takes as much of a limited rate as they do.
 class TilePublisher {
  public:
   /// Tiles outside the window that late joiners get, too.
@@ -62,7 +64,9 @@ class TilePublisher {
   /// view to continue. `robot_map` is where the window is [m].
   void publish(const std::shared_ptr<const MapSnapshot>& latest, const Eigen::Vector2d& robot_map);
   /// Tiles that are not published yet, and those that readers still take to be there.
-  [[nodiscard]] std::size_t waiting() const { return pending_.size() + gone_.size(); }
+  [[nodiscard]] std::size_t waiting() const {
+    return pending_.size() + gone_.size() + undisposed_.size();
+  }
   /// Tiles that late joiners get.
   [[nodiscard]] std::size_t held() const { return published_.size(); }
 
@@ -82,7 +86,10 @@ class TilePublisher {
   [[nodiscard]] bool last_burst_acknowledged();
   void publish_pending(const MapSnapshot& view, const dds::MapIdentity& identity);
   void publish_tile(const std::shared_ptr<const Tile>& tile, const dds::MapIdentity& identity);
-  void publish_gone(TileId id, const MapSnapshot& view, const dds::MapIdentity& identity);
+  /// The entry alone, unless it is published.
+  void announce(const TileInfo& info, const dds::MapIdentity& identity);
+  void announce_gone(TileId id, const MapSnapshot& view, const dds::MapIdentity& identity);
+  void dispose_gone(const MapSnapshot& view, const dds::MapIdentity& identity);
   /// Late joiners no longer get tiles that are far and changed long ago; who has them keeps them.
   void release_far_tiles(const dds::MapIdentity& identity);
 
@@ -99,12 +106,16 @@ class TilePublisher {
   std::set<TileId> pending_;
   /// Those that no longer exist, and readers were not told.
   std::set<TileId> gone_;
+  /// Those whose entry says so, and which readers of tiles still have.
+  std::set<TileId> undisposed_;
   /// What was published of a tile.
   struct Published {
     /// 0: of another map, the tile is gone, or it could not be read.
     std::uint64_t revision = 0;
     /// Number of the publication that brought it.
     std::uint64_t publication = 0;
+    /// Revision in its entry, where that is of this map.
+    std::optional<std::uint64_t> entry{};
   };
   std::map<TileId, Published> published_;
 };

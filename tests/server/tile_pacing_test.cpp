@@ -6,6 +6,7 @@
 #include <map>
 #include <thread>
 
+#include "idl/conversions/tile.hpp"
 #include "idl/dds/reader.hpp"
 #include "server/publishers/tile_publisher.hpp"
 #include "tests/idl/dds_fixture.hpp"
@@ -175,6 +176,61 @@ TEST_F(TilePacing, WhatChangesWhileItWaitsIsSentAsItIsThen) {
   }
   EXPECT_EQ(samples.size(), tiles);
   EXPECT_EQ(samples.rbegin()->second, 1);
+}
+
+/// Beside a reader of tiles that has room for one, and takes none.
+class StalledTileReader : public testing::Test {
+ protected:
+  static dds::DdsOptions options() {
+    dds::DdsOptions options = dds::loopback(false);
+    // So long the publisher waits for that reader.
+    options.lease_s = static_cast<std::uint32_t>(dds::discovery_timeout.count());
+    return options;
+  }
+  static dds::TopicQos room_for_one(dds::TopicQos qos) {
+    qos.keep_all = true;
+    return qos;
+  }
+  /// What the index says of tiles 0 and 1 of the row, as soon as `is_all`, or at last.
+  std::map<std::int32_t, TileInfo> take(
+      const std::function<bool(const std::map<std::int32_t, TileInfo>&)>& is_all) {
+    stillmap_msgs::msg::TileInfo message;
+    while (!is_all(entries_) && index_.take(message, {}, 5s)) {
+      entries_[message.tile_x()] = wire::from_wire(message).value();
+    }
+    return entries_;
+  }
+
+  dds::Topics topics_ = dds::Topics::in("stillmap");
+  dds::Participant here_{options()};
+  dds::Participant there_{options()};
+  TileReader tiles_;
+  TilePublisher publisher_{here_, topics_, tiles_, 2000.0};
+  dds::Reader<MapTile> stalled_{there_, topics_.tiles.dds_name, room_for_one(topics_.tiles.reader)};
+  dds::Reader<stillmap_msgs::msg::TileInfo> index_{there_, topics_.tile_index.dds_name,
+                                                   topics_.tile_index.reader};
+  std::map<std::int32_t, TileInfo> entries_;
+};
+
+TEST_F(StalledTileReader, HoldsUpNeitherEntriesNorRemovals) {
+  ASSERT_TRUE(stalled_.events().wait_for_writer(dds::discovery_timeout));
+  ASSERT_TRUE(index_.events().wait_for_writer(dds::discovery_timeout));
+  const auto row = row_of_tiles(3, 1);
+  publisher_.publish(row, Eigen::Vector2d::Zero());
+  ASSERT_EQ(publisher_.waiting(), 0U);
+  ASSERT_EQ(take([](const auto& entries) { return entries.size() == 3; }).size(), 3U);
+  auto next = std::make_shared<MapSnapshot>(*with_first_changed(*row, 2));
+  next->tiles.erase({1, 0});
+  publisher_.publish(next, Eigen::Vector2d::Zero());
+  EXPECT_EQ(publisher_.waiting(), 2U) << "voxels of one, disposal of the other";
+  const auto entries = take(
+      [](const auto& seen) { return seen.at(0).revision == 2U && seen.at(1).voxel_count == 0; });
+  EXPECT_EQ(entries.at(0).revision, 2U);
+  EXPECT_EQ(entries.at(1).voxel_count, 0U);
+  // Each is said once, whatever still waits.
+  publisher_.publish(next, Eigen::Vector2d::Zero());
+  stillmap_msgs::msg::TileInfo message;
+  EXPECT_FALSE(index_.take(message, {}, 300ms));
 }
 
 /// Of a map much larger than its window.
