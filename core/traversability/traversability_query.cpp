@@ -155,9 +155,12 @@ TraversabilitySummary summarize(const TraversabilityView& view) {
   return summary;
 }
 
-TraversabilitySummary summarize(const TraversabilityAnswer& answer) {
+TraversabilitySummary summarize(const TraversabilityAnswer& answer, const Region& region) {
   TraversabilitySummary summary;
-  for (const TraversabilityCellInfo& cell : answer.cells) count(cell, summary);
+  TraversabilityView cells;
+  cells.cell_m = answer.grid.resolution_m;
+  visit_cells(cells, traversability_region(region), range_of(answer.grid),
+              [&](std::size_t i, CellIndex) { count(answer.cells.at(i), summary); });
   return summary;
 }
 

@@ -55,7 +55,7 @@ struct TraversabilitySummary {
   std::uint64_t free = 0;
   /// Part of `free` on inferred ground.
   std::uint64_t inferred = 0;
-  /// Unknown cells of the tiles, or of an answer's grid.
+  /// Unknown cells of the tiles, or of the region that was asked for.
   std::uint64_t unknown = 0;
   /// Indexed by `BlockReason`.
   std::array<std::uint64_t, block_reason_count> lethal{};
@@ -64,8 +64,10 @@ struct TraversabilitySummary {
 };
 
 [[nodiscard]] TraversabilitySummary summarize(const TraversabilityView& view);
-/// Of an answer with a grid.
-[[nodiscard]] TraversabilitySummary summarize(const TraversabilityAnswer& answer);
+/// Of an answer with a grid, to a query of this region: its grid is the rectangle about it. Throws
+/// std::invalid_argument for a region with faults.
+[[nodiscard]] TraversabilitySummary summarize(const TraversabilityAnswer& answer,
+                                              const Region& region);
 
 /// Converts an answer to a view, for pictures and further queries. Of the surface, it has the
 /// height of known ground only; clearances are 0. @pre the answer's status is ok and it has a grid

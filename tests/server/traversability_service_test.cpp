@@ -54,7 +54,7 @@ TEST_F(TraversabilityService, TellsWhereEachRobotCanGo) {
     query.include_outlines = true;
     const TraversabilityAnswer answer = client_.get_traversable_area(query);
     ASSERT_EQ(answer.grid.status, TraversabilityStatus::ok) << answer.grid.reason;
-    const TraversabilitySummary summary = summarize(answer);
+    const TraversabilitySummary summary = summarize(answer, query.region);
     EXPECT_GT(summary.free, 100U) << robot;
     EXPECT_GT(summary.lethal.at(static_cast<std::size_t>(BlockReason::obstacle)), 10U);
     EXPECT_GT(summary.lethal.at(static_cast<std::size_t>(BlockReason::inscribed)), 10U);

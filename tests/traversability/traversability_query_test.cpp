@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "core/map/query/region.hpp"
 #include "tests/numbers.hpp"
@@ -154,8 +155,24 @@ TEST(TraversabilityAnswerView, AnswersAsTheAnswerThatItWasMadeFrom) {
     EXPECT_EQ(again.cells[i].reason, answer.cells[i].reason);
     EXPECT_EQ(again.cells[i].inferred, answer.cells[i].inferred);
   }
-  EXPECT_EQ(summarize(answer).free, summarize(view).free);
-  EXPECT_EQ(summarize(answer).lethal, summarize(view).lethal);
+  EXPECT_EQ(summarize(answer, star()).free, summarize(view).free);
+  EXPECT_EQ(summarize(answer, star()).lethal, summarize(view).lethal);
+}
+
+TEST(TraversabilitySummary, CountsTheRegionAndNotTheRectangleAboutIt) {
+  const auto cells_of = [view = area_with_house()](const Region& region) {
+    const TraversabilityAnswer answer = query_traversability(*view, of(region));
+    const TraversabilitySummary summary = summarize(answer, region);
+    return std::pair(summary.free + summary.all_lethal() + summary.unknown, answer.cells.size());
+  };
+  constexpr double cell_m2 = 0.2 * 0.2;
+  const auto [circle, square] = cells_of(SphereRegion{.centre_map = {-2, -1, 0}, .radius_m = 5});
+  EXPECT_NEAR(static_cast<double>(circle) * cell_m2, 25.0 * std::numbers::pi, 1.5);
+  EXPECT_GT(static_cast<double>(square) * cell_m2, 99.0);
+  const auto [corridor, about_it] =
+      cells_of(CorridorRegion{.path_map = {{-6, -6}, {4, 4}}, .half_width_m = 0.5, .heights = {}});
+  EXPECT_NEAR(static_cast<double>(corridor) * cell_m2, 14.1 + 0.25 * std::numbers::pi, 1.5);
+  EXPECT_GT(about_it, 5 * corridor);
 }
 
 }  // namespace

@@ -133,12 +133,16 @@ struct TraversableArguments {
   bool json = false;
 };
 
-TraversabilityAnswer query_traversability(TraversabilitySource& source,
-                                          const TraversableArguments& arguments) {
+TraversabilityQuery query_of(const TraversableArguments& arguments, TraversabilitySource& source) {
   TraversabilityQuery query;
   query.region = region_of(arguments.region, source);
   query.include_outlines = !arguments.outlines.empty();
   query.min_outline_area_m2 = arguments.min_outline_area_m2;
+  return query;
+}
+
+TraversabilityAnswer query_traversability(TraversabilitySource& source,
+                                          const TraversabilityQuery& query) {
   TraversabilityAnswer answer = source.traversability(query);
   if (answer.grid.status != TraversabilityStatus::ok)
     throw std::invalid_argument(answer.grid.reason);
@@ -156,11 +160,13 @@ ExitCode run(const TraversableArguments& arguments) {
   check_region(arguments.region);
   const auto began = std::chrono::steady_clock::now();
   const std::unique_ptr<TraversabilitySource> source = open_traversability_source(arguments.source);
-  const TraversabilityAnswer answer = query_traversability(*source, arguments);
+  const TraversabilityQuery query = query_of(arguments, *source);
+  const TraversabilityAnswer answer = query_traversability(*source, query);
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
   const TraversabilityView view = view_of_answer(answer, source->robot());
-  const TraversabilityReport report{
-      .summary = summarize(answer), .update = source->update_stats(), .milliseconds = took.count()};
+  const TraversabilityReport report{.summary = summarize(answer, query.region),
+                                    .update = source->update_stats(),
+                                    .milliseconds = took.count()};
   if (!arguments.out.empty()) write_nav2_map(arguments.out, answer.grid);
   if (!arguments.outlines.empty()) {
     write_outlines(arguments.outlines, answer, view.profile.name);
