@@ -81,11 +81,10 @@ std::optional<SavedMap> MapSaver::load(const std::function<void(const MapSnapsho
   if (file_.empty()) return std::nullopt;
   SavedMap map = read(*store_);
   if (check && !map.view.tiles.empty()) check(map.view);
-  // Clients may have seen later versions than the stored one; under a new id, the versions that
-  // follow cannot be confused with those. Maps of older programs all have the id 0.
-  if (!map.metadata.contains(map_ended_key) || map.view.map_id == 0) {
-    map.view.map_id = new_map_id();
-  }
+  // Clients may have seen later versions than the stored one: of a run that was killed, or, where
+  // the file is a backup that was copied back, of one that ended well. Under a new id, the versions
+  // that follow cannot be confused with those.
+  map.view.map_id = new_map_id();
   store_->begin_run(map.view.map_id, session_);
   is_session_ = !map.view.tiles.empty();
   if (!map.view.tiles.empty()) remember_as_saved(map.view, latest_map_.poses_added());

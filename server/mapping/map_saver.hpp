@@ -133,9 +133,8 @@ class MapSaver {
            MonotonicClock& clock = MonotonicClock::steady());
 
   /// What the file holds, for mapping to resume from; nothing when there is no file. With a memory
-  /// limit, its tiles are non-resident. The map has a new id unless it was saved when its last run
-  /// ended. Throws MapFileError, and what `check` throws of what the file holds, which then stays
-  /// as it is.
+  /// limit, its tiles are non-resident. The map has a new id. Throws MapFileError, and what `check`
+  /// throws of what the file holds, which then stays as it is.
   [[nodiscard]] std::optional<SavedMap> load(
       const std::function<void(const MapSnapshot&)>& check = {});
   /// Instead of `load`: a map that the file holds is renamed, and the file empty from now on.

@@ -80,8 +80,34 @@ TEST_F(MapSaverTest, AMapThatIsRefusedKeepsItsFileAsItIs) {
     const auto refuse = [](const MapSnapshot&) { throw std::invalid_argument("other voxels"); };
     EXPECT_THROW(static_cast<void>(saver.load(refuse)), std::invalid_argument);
   }
-  MapSaver saver(latest_map_, statistics_, folder_ / "map.stillmap", {});
-  EXPECT_EQ(saver.load()->view.map_id, map_id) << "it still says how its last run ended";
+  const SavedMap kept = open_map_file(folder_ / "map.stillmap")->load();
+  EXPECT_EQ(kept.view.map_id, map_id);
+  EXPECT_TRUE(kept.metadata.contains(map_ended_key)) << "it still says how its last run ended";
+}
+
+TEST_F(MapSaverTest, ABackupThatIsCopiedBackIsAnotherMap) {
+  const auto file = folder_ / "map.stillmap";
+  map_.reset(77);
+  latest_map_.begin(map_.view(), {});
+  map_scan(5.0F);
+  {
+    MapSaver saver(latest_map_, statistics_, file, {});
+    saver.set_source(source_);
+    saver.save_at_end();
+  }
+  const auto backup = folder_ / "backup.stillmap";
+  std::filesystem::copy_file(file, backup);
+  // As a server that starts: versions follow those of the backup, and clients see them.
+  const auto id_of_run = [&] {
+    MapSaver saver(latest_map_, statistics_, file, {});
+    const SavedMap stored = saver.load().value();
+    return stored.view.map_id;
+  };
+  const std::uint64_t first = id_of_run();
+  std::filesystem::copy_file(backup, file, std::filesystem::copy_options::overwrite_existing);
+  ASSERT_TRUE(open_map_file(file)->load().metadata.contains(map_ended_key));
+  // They follow them once more, with other content.
+  EXPECT_NE(id_of_run(), first);
 }
 
 TEST_F(MapSaverTest, LeavesTheFileAloneUntilSomethingWasMapped) {

@@ -39,8 +39,7 @@ class MapFileWriteError : public MapFileError {
   std::filesystem::path file_;
 };
 
-/// Metadata key of a map that was saved at the end of its run: all versions that a client may have
-/// seen are stored.
+/// Metadata key of a map that was saved at the end of its run: nothing that was mapped is missing.
 inline constexpr const char* map_ended_key = "ended";
 
 /// What a map file holds.
