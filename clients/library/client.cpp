@@ -181,7 +181,8 @@ OctomapData Client::octomap(bool full) {
   // The standard's reply has no place for a reason.
   if (reply.map().id().empty()) {
     throw ServiceError(connection_->name_of(service) +
-                       " has no octree: the server's configuration has occupancy.enabled false");
+                       " has no octree: that of a map that has just begun is still being made (ask "
+                       "again), or the server's configuration has occupancy.enabled false");
   }
   auto data = wire::from_octomap(reply.map());
   const bool is_sound = data && data->binary != full && check_octomap(*data).fault.empty();

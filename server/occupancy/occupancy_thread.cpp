@@ -40,10 +40,11 @@ void OccupancyThread::insert_urgent(Jobs& jobs, Job job) {
 void OccupancyThread::begin(std::shared_ptr<const MapSnapshot> view) {
   jobs_.edit([&](Jobs& jobs) {
     std::erase_if(jobs, [](const Job& job) { return !std::holds_alternative<Encoding>(job); });
+    next_map_ = view->tiles.empty() ? NextMap::empty : NextMap::of_voxels;
     insert_urgent(jobs, NewMap{std::move(view)});
-    has_old_map_ = true;
     ++maps_begun_;
   });
+  made_.notify_all();
 }
 
 void OccupancyThread::add(OccupancyScan scan) {
@@ -79,14 +80,17 @@ void OccupancyThread::run(NewMap job) {
         left_out, fresh.reach_m());
   }
   fresh.begin_residency(*job.view);
-  const std::scoped_lock lock(map_mutex_);
-  map_ = std::move(fresh);
-  stamp_ns_ = 0;
-  jobs_.edit([&](const Jobs& jobs) {
-    // Unless yet another new map waits.
-    has_old_map_ = !jobs.empty() && std::holds_alternative<NewMap>(jobs.front());
-  });
-  ++changes_;
+  {
+    const std::scoped_lock lock(map_mutex_);
+    map_ = std::move(fresh);
+    stamp_ns_ = 0;
+    jobs_.edit([&](const Jobs& jobs) {
+      const bool another_waits = !jobs.empty() && std::holds_alternative<NewMap>(jobs.front());
+      if (!another_waits) next_map_ = NextMap::none;
+    });
+    ++changes_;
+  }
+  made_.notify_all();
 }
 
 void OccupancyThread::run(Encoding job) {
@@ -122,15 +126,23 @@ void OccupancyThread::throttle() const {
   if (throttle_) throttle_();
 }
 
+std::unique_lock<std::mutex> OccupancyThread::lock_made() const {
+  std::unique_lock lock(map_mutex_);
+  if (made_.wait_for(lock, longest_wait, [this] { return next_map_ != NextMap::of_voxels; })) {
+    return lock;
+  }
+  throw OctreeNotMade(
+      "the octree of the map that has just begun is still being made, at idle priority: ask again");
+}
+
 OccupancyAnswers OccupancyThread::answer(const OccupancyQuery& query) const {
-  if (has_old_map_) return OccupancyMap(config_).answer(query);
-  const std::scoped_lock lock(map_mutex_);
-  return map_.answer(query);
+  const auto lock = lock_made();
+  return next_map_ == NextMap::empty ? OccupancyMap(config_).answer(query) : map_.answer(query);
 }
 
 EncodedOctree OccupancyThread::encode(bool binary) const {
-  if (has_old_map_) return {OccupancyMap(config_).encode(binary), 0};
-  const std::scoped_lock lock(map_mutex_);
+  const auto lock = lock_made();
+  if (next_map_ == NextMap::empty) return {OccupancyMap(config_).encode(binary), 0};
   return {map_.encode(binary), stamp_ns_};
 }
 

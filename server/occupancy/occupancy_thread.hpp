@@ -1,10 +1,14 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
 #include <deque>
 #include <future>
 #include <memory>
 #include <mutex>
+#include <stdexcept>
 #include <variant>
 
 #include "config/loaders/server_config.hpp"
@@ -30,6 +34,12 @@ struct EncodedOctree {
   std::int64_t stamp_ns = 0;
 };
 
+/// The octree of a map that has just begun is not there yet.
+class OctreeNotMade : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// Keeps the octree on a thread, of idle priority so that the mapper never waits for it. When it
 /// cannot keep up, it first stops clearing free space along the rays ("occupancy_not_cleared" in
 /// the status), then drops scans ("occupancy_scans_dropped"). Thread-safe.
@@ -39,16 +49,21 @@ class OccupancyThread {
                   ThrottleCallback throttle = {},
                   BackgroundScheduling scheduling = BackgroundScheduling::idle);
 
-  /// Starts a new map from the voxels of this view; until they are inserted, queries see an empty
-  /// map. Returns at once, as `add` does.
+  /// How long queries wait for the octree of a map that has just begun: less than clients wait for
+  /// an answer before they ask again.
+  static constexpr std::chrono::milliseconds longest_wait{2000};
+
+  /// Starts a new map from the voxels of this view; until they are inserted, queries wait. Returns
+  /// at once, as `add` does.
   void begin(std::shared_ptr<const MapSnapshot> view);
   void add(OccupancyScan scan);
   /// Drops and restores parts of the octree with the tiles that were evicted and reloaded.
   void follow(std::shared_ptr<const MapSnapshot> view);
 
-  /// Throws std::invalid_argument for a query that asks for too much.
+  /// Throws std::invalid_argument for a query that asks for too much, OctreeNotMade after
+  /// `longest_wait`.
   [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query) const;
-  /// Encodes on the calling thread.
+  /// Encodes on the calling thread. Throws OctreeNotMade after `longest_wait`.
   [[nodiscard]] EncodedOctree encode(bool binary) const;
   /// Encodes on this object's thread, before the scans that wait; one request at a time. The future
   /// throws std::future_error when the thread ends before.
@@ -82,6 +97,8 @@ class OccupancyThread {
   /// Part of the update that was computed; true while more is left.
   bool apply_portion();
   void throttle() const;
+  /// Waits while the octree is of a map that is no more, and the new one's is still being made.
+  [[nodiscard]] std::unique_lock<std::mutex> lock_made() const;
 
   OccupancyConfig config_;
   std::size_t max_scans_;
@@ -92,8 +109,11 @@ class OccupancyThread {
   std::shared_ptr<const MapSnapshot> followed_;
   mutable std::mutex map_mutex_;
   OccupancyMap map_;
-  /// A new map waits to replace it. Changed under the queue's lock.
-  std::atomic<bool> has_old_map_ = false;
+  /// What waits to replace it: a map without voxels needs no octree to answer from.
+  enum class NextMap : std::uint8_t { none, empty, of_voxels };
+  /// Changed under the queue's lock.
+  std::atomic<NextMap> next_map_ = NextMap::none;
+  mutable std::condition_variable made_;
   std::atomic<std::uint64_t> maps_begun_ = 0;
   std::uint64_t changes_ = 0;
   std::int64_t stamp_ns_ = 0;

@@ -11,8 +11,12 @@ namespace {
 octomap_msgs::srv::GetOctomap_Response octomap(const ServiceContext& context, bool binary) {
   octomap_msgs::srv::GetOctomap_Response response;
   if (!context.encode_octomap) return response;
-  const EncodedOctree octree = context.encode_octomap(binary);
-  response.map(wire::to_octomap(octree.data, octree.stamp_ns, context.map_frame));
+  try {
+    const EncodedOctree octree = context.encode_octomap(binary);
+    response.map(wire::to_octomap(octree.data, octree.stamp_ns, context.map_frame));
+  } catch (const OctreeNotMade&) {
+    // The standard's reply has no place for a reason; one without a name is none.
+  }
   return response;
 }
 

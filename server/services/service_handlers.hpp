@@ -32,7 +32,7 @@ void drop_expired_pages(const ServiceContext& context);
 [[nodiscard]] srv::Reset_Response reset(const ServiceContext& context,
                                         const srv::Reset_Request& request);
 
-/// The octree; without name and data when the server keeps none.
+/// The octree; without name and data when the server keeps none, or it is not made yet.
 [[nodiscard]] octomap_msgs::srv::GetOctomap_Response octomap_binary(
     const ServiceContext& context, const octomap_msgs::srv::GetOctomap_Request& request);
 [[nodiscard]] octomap_msgs::srv::GetOctomap_Response octomap_full(

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <condition_variable>
+#include <future>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -131,6 +132,26 @@ TEST_F(GatedOccupancyThreadTest, EncodesInAGap) {
   EXPECT_EQ(encoded.wait_for(0s), std::future_status::timeout);
   set_open(true);
   EXPECT_EQ(encoded.wait_for(patience), std::future_status::ready);
+}
+
+TEST_F(GatedOccupancyThreadTest, WaitsForTheOctreeOfAMapThatBeginsWithVoxels) {
+  StaticMap map{StaticMapConfig{}};
+  const server::OccupancyScan scan = room(0);
+  map.insert(*scan.labelled, scan.T_map_lidar);
+  ASSERT_FALSE(map.view()->tiles.empty());
+  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate(), scheduling);
+  set_open(false);
+  thread.begin(map.view());
+  ASSERT_TRUE(waits());
+  // Nothing known is no answer.
+  EXPECT_THROW(static_cast<void>(all_of(thread)), server::OctreeNotMade);
+  EXPECT_THROW(static_cast<void>(thread.encode(true)), server::OctreeNotMade);
+  std::future<BoxOccupancy> asked =
+      std::async(std::launch::async, [&thread] { return all_of(thread); });
+  EXPECT_EQ(asked.wait_for(100ms), std::future_status::timeout);
+  set_open(true);
+  EXPECT_GT(asked.get().occupied, 100U);
+  EXPECT_FALSE(thread.encode(true).data.bytes.empty());
 }
 
 TEST_F(GatedOccupancyThreadTest, ShowsNothingOfTheOldMapWhileANewOneWaitsForAGap) {
