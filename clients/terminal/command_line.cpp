@@ -252,6 +252,11 @@ OptionHandle CommandHandle::option(const std::string& names, std::uint64_t& valu
   return OptionHandle(*app_->add_option(names, value, help)->check(fault_of_unsigned));
 }
 
+OptionHandle CommandHandle::option(const std::string& names, std::optional<std::uint64_t>& value,
+                                   const std::string& help) {
+  return OptionHandle(*app_->add_option(names, value, help)->check(fault_of_unsigned));
+}
+
 OptionHandle CommandHandle::option(const std::string& names, std::vector<std::string>& values,
                                    const std::string& help) {
   return OptionHandle(*app_->add_option(names, values, help));

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -61,6 +62,9 @@ class CommandHandle {
   /// A negative number is wrong usage.
   OptionHandle option(const std::string& names, std::uint32_t& value, const std::string& help);
   OptionHandle option(const std::string& names, std::uint64_t& value, const std::string& help);
+  /// Nothing where it is not given: every number has a meaning.
+  OptionHandle option(const std::string& names, std::optional<std::uint64_t>& value,
+                      const std::string& help);
   OptionHandle option(const std::string& names, std::vector<std::string>& values,
                       const std::string& help);
   OptionHandle option(const std::string& names, std::vector<double>& values,

@@ -141,6 +141,10 @@ TEST_F(ServiceCommandTest, AsksARunningServerForEverythingOfItsMap) {
   const ProcessResult unknown = run("query --since-map 1 --since-version 1" + on_domain());
   EXPECT_EQ(unknown.exit_code, 2);
   EXPECT_THAT(unknown.err, HasSubstr("ask for everything"));
+  // The largest number is no word for none.
+  const ProcessResult future = run("query --since-version 18446744073709551615" + on_domain());
+  EXPECT_EQ(future.exit_code, 2);
+  EXPECT_THAT(future.err, HasSubstr("since_version is 18446744073709551615, the map is at"));
 
   const std::string tiles = std::to_string(way.at("tiles").size());
   const ProcessResult watched =

@@ -1,6 +1,6 @@
 #include <iostream>
-#include <limits>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -17,14 +17,12 @@
 namespace stillmap::cli {
 namespace {
 
-constexpr std::uint64_t not_given = std::numeric_limits<std::uint64_t>::max();
-
 struct QueryArguments {
   ClientArguments client;
   RegionArguments region;
   std::vector<std::string> classes;
   double resolution_m = 0.0;
-  std::uint64_t since_version = not_given;
+  std::optional<std::uint64_t> since_version;
   /// 0: the server's current map.
   std::uint64_t since_map = 0;
   std::string out;
@@ -47,10 +45,10 @@ void draw_query(const std::string& file, Client& client, const Region& region,
 }
 
 std::optional<KnownVersion> since_of(const QueryArguments& arguments, Client& client) {
-  if (arguments.since_version == not_given) return std::nullopt;
+  if (!arguments.since_version) return std::nullopt;
   const std::uint64_t map_id =
       arguments.since_map == 0 ? client.status().map_id : arguments.since_map;
-  return KnownVersion{.map_id = map_id, .version = arguments.since_version};
+  return KnownVersion{.map_id = map_id, .version = *arguments.since_version};
 }
 
 /// The filters of the query, which can be checked without a server.
@@ -111,7 +109,8 @@ void add_query_command(CommandHandle program, Action& action) {
                      "Only tiles that appeared or changed since this version; names those removed");
   command
       .option("--since-map", arguments->since_map,
-              "Id of the map that the version is of; default: the server's current map")
+              "Id of the map that the version is of; default: the server's current map, which has "
+              "another id after every start of the server")
       .needs(since_version);
   command.option("--out", arguments->out, "Write the voxels to FILE.pcd or FILE.ply");
   command.option("--picture", arguments->picture,
