@@ -46,6 +46,9 @@ ExitCode run_action(const Action& action) {
                   ExitCode::failed);
   } catch (const ServiceTimeout& error) {
     return report(error, ExitCode::no_server);
+  } catch (const ServiceError& error) {
+    const bool is_input = error.code() == wire::ReplyCode::invalid_request;
+    return report(error, is_input ? ExitCode::bad_input : ExitCode::failed);
   } catch (const DatasetWriteError& error) {
     return report(error, code_of_unwritten(error.file()));
   } catch (const MapFileWriteError& error) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -21,6 +22,7 @@
 #include "core/traversability/traversability_view.hpp"
 #include "idl/conversions/cloud_to_scan.hpp"
 #include "idl/conversions/localization.hpp"
+#include "idl/conversions/map_query.hpp"
 #include "idl/conversions/submaps.hpp"
 #include "idl/dds/dds_options.hpp"
 #include "idl/interface/map_identity.hpp"
@@ -32,7 +34,14 @@ namespace stillmap {
 /// to check.
 class ServiceError : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  explicit ServiceError(const std::string& text, std::optional<wire::ReplyCode> code = std::nullopt)
+      : std::runtime_error(text), code_(code) {}
+
+  /// Of the server's reply; nothing where none came, or what came cannot be understood.
+  [[nodiscard]] std::optional<wire::ReplyCode> code() const { return code_; }
+
+ private:
+  std::optional<wire::ReplyCode> code_;
 };
 
 /// There was no answer in time.

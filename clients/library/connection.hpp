@@ -56,7 +56,7 @@ struct Client::Connection {
     Reply reply = call(spec, std::move(request));
     const auto code = static_cast<wire::ReplyCode>(reply.status().code());
     if (code != wire::ReplyCode::ok && code != wire::ReplyCode::failed)
-      throw ServiceError(name_of(spec) + " was refused: " + reply.status().reason());
+      throw refusal_of(spec, reply.status());
     return reply;
   }
 
@@ -65,7 +65,7 @@ struct Client::Connection {
   [[nodiscard]] Reply call_ok(const dds::ServiceSpec<Request, Reply>& spec, Request request) {
     Reply reply = call(spec, std::move(request));
     if (reply.status().code() != static_cast<std::uint8_t>(wire::ReplyCode::ok)) {
-      throw ServiceError(name_of(spec) + " was refused: " + reply.status().reason());
+      throw refusal_of(spec, reply.status());
     }
     return reply;
   }
@@ -76,7 +76,8 @@ struct Client::Connection {
                                      Request request) {
     Reply reply = call(spec, std::move(request));
     if (reply.status().code() == static_cast<std::uint8_t>(wire::ReplyCode::failed)) {
-      throw ServiceError(name_of(spec) + " failed: " + reply.status().reason());
+      throw ServiceError(name_of(spec) + " failed: " + reply.status().reason(),
+                         wire::ReplyCode::failed);
     }
     return reply;
   }
@@ -91,6 +92,13 @@ struct Client::Connection {
   template <typename Request, typename Reply>
   [[nodiscard]] std::string name_of(const dds::ServiceSpec<Request, Reply>& spec) const {
     return spec.in(options.server_name);
+  }
+
+  template <typename Request, typename Reply>
+  [[nodiscard]] ServiceError refusal_of(const dds::ServiceSpec<Request, Reply>& spec,
+                                        const stillmap_msgs::msg::ReplyStatus& status) const {
+    return ServiceError(name_of(spec) + " was refused: " + status.reason(),
+                        static_cast<wire::ReplyCode>(status.code()));
   }
 
   /// The value that a conversion read from a reply of this service; throws ServiceError where it

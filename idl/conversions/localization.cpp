@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -30,10 +31,10 @@ constexpr double max_asked_radius_m = 10'000.0;
 constexpr double deviations = 3.0;
 
 void require(bool holds, const char* field, double value, const std::string& must) {
-  if (!holds) {
-    throw std::invalid_argument(std::string(field) + " is " + std::to_string(value) +
-                                ": it must be " + must);
-  }
+  if (holds) return;
+  std::ostringstream text;
+  text << field << " is " << value << ": it must be " << must;
+  throw std::invalid_argument(text.str());
 }
 
 double heading_rad(const Eigen::Isometry3d& T) {

@@ -91,6 +91,18 @@ TEST_F(HelpTest, TimesHaveLimitsThatTheHelpShows) {
   }
 }
 
+TEST_F(HelpTest, PlacesThatAreNoneAreWrongUsage) {
+  for (const auto& [command, named] :
+       {std::pair("locate --near nan 0 0", "--near"), std::pair("locate --near 0 0 inf", "--near"),
+        std::pair("locate --near 0 0 0 --radius 1e300", "--radius"),
+        std::pair("locate --near 0 0 0 --max-turn nan", "--max-turn")}) {
+    const ProcessResult result = run(command);
+    EXPECT_EQ(result.exit_code, 2) << command;
+    EXPECT_THAT(result.err, HasSubstr(named)) << command;
+    EXPECT_LT(result.err.size(), 200U) << result.err;
+  }
+}
+
 TEST_F(HelpTest, WhatSaysNothingAloneNamesWhatItNeeds) {
   for (const auto& [command, needed] :
        {std::pair("sessions x --out y", "--withdraw"),

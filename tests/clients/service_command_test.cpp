@@ -141,6 +141,9 @@ TEST_F(ServiceCommandTest, AsksARunningServerForEverythingOfItsMap) {
   const ProcessResult unknown = run("query --since-map 1 --since-version 1" + on_domain());
   EXPECT_EQ(unknown.exit_code, 2);
   EXPECT_THAT(unknown.err, HasSubstr("ask for everything"));
+  const ProcessResult outside = run("save ../up.stillmap" + on_domain());
+  EXPECT_EQ(outside.exit_code, 2) << outside.err;
+  EXPECT_THAT(outside.err, HasSubstr("was refused: file '../up.stillmap'"));
   // The largest number is no word for none.
   const ProcessResult future = run("query --since-version 18446744073709551615" + on_domain());
   EXPECT_EQ(future.exit_code, 2);

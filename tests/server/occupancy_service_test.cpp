@@ -130,6 +130,7 @@ TEST_F(OccupancyService, RefusesAQueryThatAsksForTooMuch) {
     FAIL() << "answered";
   } catch (const ServiceError& error) {
     EXPECT_THAT(error.what(), HasSubstr("1001 rays"));
+    EXPECT_EQ(error.code(), wire::ReplyCode::invalid_request);
   }
   EXPECT_GT(voxels().occupied, 0U);
 }

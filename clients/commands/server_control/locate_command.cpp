@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <iostream>
 #include <memory>
@@ -70,6 +71,8 @@ std::string describe(const LocalizationAnswer& answer) {
 }
 
 ExitCode run(const LocateArguments& arguments) {
+  if (!std::ranges::all_of(arguments.near, [](double value) { return std::isfinite(value); }))
+    throw std::invalid_argument("--near takes finite numbers: X Y [m] and heading [degrees]");
   if (arguments.near.empty() && (arguments.radius_m != 20.0 || arguments.max_turn_deg != 180.0))
     throw std::invalid_argument("--radius and --max-turn are round the pose of --near");
   Client client = connect(arguments.client);
@@ -88,7 +91,7 @@ void add_locate_command(CommandHandle program, Action& action) {
       .option("--near", arguments->near, "X Y [m] and heading [degrees]: look near this pose alone")
       .exactly(3);
   command.option("--radius", arguments->radius_m, "Look so far from it [m]")
-      .above_zero()
+      .above_zero_to(10'000)
       .with_default();
   command.option("--max-turn", arguments->max_turn_deg, "It is turned by so much at most [degrees]")
       .above_zero()
