@@ -209,10 +209,12 @@ void ScanDataset::learn_from_sample() {
   std::vector<std::pair<std::size_t, std::size_t>> readable;
   std::vector<float> full_scales;
   std::optional<DatasetError> fault;
+  bool brings_labels = false, is_any_known = false;
   for (const std::size_t i : sample()) {
     try {
       const DatasetFrame frame = read_unscaled(i);
-      if (readable.empty()) has_labels_ = !frame.raw_labels.empty();
+      if (readable.empty()) brings_labels = !frame.raw_labels.empty();
+      is_any_known |= has_known_class(reduced_classes(frame.raw_labels));
       readable.emplace_back(frame.scan.size(), i);
       full_scales.push_back(intensity_full_scale(frame.scan.intensity));
     } catch (const DatasetError& error) {
@@ -220,6 +222,7 @@ void ScanDataset::learn_from_sample() {
     }
   }
   if (readable.empty()) throw DatasetError(*fault);
+  has_labels_ = brings_labels && is_any_known;
   std::ranges::sort(readable);
   const Scan typical = read_unscaled(readable[readable.size() / 2].second).scan;
   // The brightest but one of many: dark scans say too little, broken ones too much.

@@ -41,7 +41,7 @@ class ScanDataset {
   [[nodiscard]] std::int64_t stamp_ns(std::size_t i) const { return stamps_ns_.at(i); }
 
   /// Whether scans come with labels: as the first of some from all over the dataset that can be
-  /// read.
+  /// read. Labels without one known class, as where PCL's PointXYZL was saved unfilled, are none.
   [[nodiscard]] bool has_labels() const { return has_labels_; }
   /// Whether this one does. Throws as read() does.
   [[nodiscard]] bool has_labels(std::size_t i) const;

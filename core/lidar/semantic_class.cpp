@@ -44,6 +44,11 @@ Rgb colour(SemanticClass label) { return facts_of(label).colour; }
 
 std::uint16_t semantic_kitti_id(SemanticClass label) { return facts_of(label).semantic_kitti_id; }
 
+bool has_known_class(std::span<const SemanticClass> labels) {
+  return std::ranges::any_of(labels,
+                             [](SemanticClass label) { return label != SemanticClass::unlabeled; });
+}
+
 SemanticClass class_from_semantic_kitti(std::uint16_t original_id) {
   switch (original_id) {
     case 13:   // bus

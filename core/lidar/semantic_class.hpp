@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string_view>
 
 namespace stillmap {
@@ -60,6 +61,9 @@ struct Rgb {
   return (label >= SemanticClass::road && label <= SemanticClass::other_ground) ||
          label == SemanticClass::terrain;
 }
+
+/// Whether any of them is a class. Fields that nobody filled hold zeros: those are no labels.
+[[nodiscard]] bool has_known_class(std::span<const SemanticClass> labels);
 
 /// Class of an original SemanticKITTI id (the low 16 bits of a .label entry), as `learning_map`
 /// of the data set's configuration gives it: moving-car becomes car, lane-marking becomes road.

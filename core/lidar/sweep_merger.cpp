@@ -47,6 +47,29 @@ void append(std::vector<T>& all, const std::vector<T>& part, std::size_t points,
   }
 }
 
+/// Of all points whose intensity is known; nothing without any.
+std::optional<float> mean_intensity(std::span<const Scan> parts) {
+  double sum = 0.0;
+  std::size_t known = 0;
+  for (const Scan& part : parts) {
+    for (const float intensity : part.intensity) {
+      if (!std::isfinite(intensity)) continue;
+      sum += intensity;
+      ++known;
+    }
+  }
+  if (known > 0) return static_cast<float>(sum / static_cast<double>(known));
+  const bool is_there =
+      std::ranges::any_of(parts, [](const Scan& part) { return !part.intensity.empty(); });
+  return is_there ? std::make_optional(0.0F) : std::nullopt;
+}
+
+bool is_labelled(const Scan& scan) { return has_known_class(scan.labels); }
+
+bool are_partly_labelled(std::span<const Scan> parts) {
+  return std::ranges::any_of(parts, is_labelled) && !std::ranges::all_of(parts, is_labelled);
+}
+
 }  // namespace
 
 Eigen::Isometry3d merged_frame(std::span<const Eigen::Isometry3d> T_base_lidars) {
@@ -95,17 +118,16 @@ void move_points(Scan& scan, const Eigen::Isometry3d& T_new_old) {
   for (Eigen::Vector3f& point : scan.points_lidar) point = T * point;
 }
 
-Scan merged_scan(std::vector<Scan> parts) {
+Scan merged_scan(std::vector<Scan> parts, PartialLabels partial_labels) {
   Scan merged;
   if (parts.empty()) return merged;
   merged.stamp_ns = std::ranges::min(parts, {}, &Scan::stamp_ns).stamp_ns;
   const bool has_times = std::ranges::any_of(parts, [&](const Scan& part) {
     return part.stamp_ns != merged.stamp_ns || !part.time_offset_s.empty();
   });
-  const bool has_intensity =
-      std::ranges::any_of(parts, [](const Scan& part) { return !part.intensity.empty(); });
-  const bool has_labels =
-      std::ranges::any_of(parts, [](const Scan& part) { return !part.labels.empty(); });
+  const std::optional<float> usual_intensity = mean_intensity(parts);
+  const bool has_labels = std::ranges::any_of(parts, is_labelled) &&
+                          (partial_labels == PartialLabels::keep || !are_partly_labelled(parts));
   for (Scan& part : parts) {
     const auto later_s = static_cast<float>(seconds(part.stamp_ns - merged.stamp_ns));
     for (float& time_s : part.time_offset_s) time_s += later_s;
@@ -113,7 +135,7 @@ Scan merged_scan(std::vector<Scan> parts) {
     merged.points_lidar.insert(merged.points_lidar.end(), part.points_lidar.begin(),
                                part.points_lidar.end());
     if (has_times) append(merged.time_offset_s, part.time_offset_s, points, later_s);
-    if (has_intensity) append(merged.intensity, part.intensity, points, 0.0F);
+    if (usual_intensity) append(merged.intensity, part.intensity, points, *usual_intensity);
     if (has_labels) append(merged.labels, part.labels, points, SemanticClass::unlabeled);
   }
   return merged;
@@ -200,7 +222,8 @@ std::optional<SweepMerger::Sweep> SweepMerger::next(double now_s) {
     if (is_missing) sweep.missing.push_back(lidar);
   }
   last_stamp_ns_ = stamp_ns;
-  sweep.scan = merged_scan(std::move(parts));
+  sweep.is_partly_labelled = are_partly_labelled(parts);
+  sweep.scan = merged_scan(std::move(parts), config_.partial_labels);
   return sweep;
 }
 

@@ -30,10 +30,20 @@ struct PlacedSensor {
 /// The scan's points in another frame.
 void move_points(Scan& scan, const Eigen::Isometry3d& T_new_old);
 
+/// What becomes of labels that some lidars send and others do not.
+enum class PartialLabels : std::uint8_t {
+  /// They stay; points of the others have none.
+  keep,
+  /// They are left out, so that one network labels all points: it works on whole scans alone.
+  drop,
+};
+
 /// Scans of several lidars on one robot as one, at the stamp of the earliest. Every point keeps the
-/// time at which it was measured, now from that stamp; rings do not count any more. The parts are
-/// in the merged frame.
-[[nodiscard]] Scan merged_scan(std::vector<Scan> parts);
+/// time at which it was measured, now from that stamp; rings do not count any more. Points of a
+/// lidar without intensity get the mean of the others', which tells nothing. The parts are in the
+/// merged frame.
+[[nodiscard]] Scan merged_scan(std::vector<Scan> parts,
+                               PartialLabels partial_labels = PartialLabels::keep);
 
 /// Sorts the scans of several lidars into sweeps: scans whose stamps lie less than half a period
 /// apart, one of each lidar. Reads no clock: the caller says when a scan arrived.
@@ -44,12 +54,15 @@ class SweepMerger {
     double period_s = 0.1;
     /// Longest wait for a lidar's scan after the first of its sweep has arrived.
     double max_wait_s = 0.1;
+    PartialLabels partial_labels = PartialLabels::keep;
   };
 
   struct Sweep {
     Scan scan;
     /// Lidars that sent nothing in time, but for those that were not due.
     std::vector<std::size_t> missing;
+    /// Some lidars sent labels, others did not.
+    bool is_partly_labelled = false;
   };
 
   explicit SweepMerger(const Config& config);

@@ -8,6 +8,7 @@ namespace stillmap {
 
 PointLabels PassthroughSegmenter::segment(const Scan& scan) {
   assert(scan.labels.empty() || scan.labels.size() == scan.size());
+  if (!has_known_class(scan.labels)) return {};
   PointLabels labels{.classes = scan.labels, .confidence = {}};
   labels.confidence.resize(scan.labels.size());
   std::ranges::transform(scan.labels, labels.confidence.begin(), [](SemanticClass label) {
@@ -24,9 +25,9 @@ std::string FallbackSegmenter::name() const {
 }
 
 PointLabels FallbackSegmenter::segment(const Scan& scan) {
-  const bool has_labels = !scan.labels.empty();
-  uses_stream_ = has_labels;
-  return has_labels ? PassthroughSegmenter().segment(scan) : fallback_->segment(scan);
+  const bool is_labelled = has_labels(scan);
+  uses_stream_ = is_labelled;
+  return is_labelled ? PassthroughSegmenter().segment(scan) : fallback_->segment(scan);
 }
 
 }  // namespace stillmap

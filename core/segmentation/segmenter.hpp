@@ -52,7 +52,7 @@ class Segmenter {
 };
 
 /// Labels that come with the scan, from a dataset or a point cloud's label field, with confidence 1
-/// (0 for unlabeled points). No labels for a scan without them.
+/// (0 for unlabeled points). No labels for a scan without them, or without one known class.
 class PassthroughSegmenter final : public Segmenter {
  public:
   [[nodiscard]] std::string name() const override { return "stream"; }
@@ -66,7 +66,8 @@ class NullSegmenter final : public Segmenter {
   [[nodiscard]] PointLabels segment(const Scan& /*scan*/) override { return {}; }
 };
 
-/// The labels that come with the scan; for scans without labels those of another segmenter.
+/// The labels that come with the scan; for scans without one known class those of another
+/// segmenter.
 class FallbackSegmenter final : public Segmenter {
  public:
   explicit FallbackSegmenter(std::unique_ptr<Segmenter> fallback);
@@ -88,7 +89,9 @@ class FallbackSegmenter final : public Segmenter {
   [[nodiscard]] int image_columns() const override {
     return uses_stream_ ? 0 : fallback_->image_columns();
   }
-  [[nodiscard]] bool has_labels(const Scan& scan) const override { return !scan.labels.empty(); }
+  [[nodiscard]] bool has_labels(const Scan& scan) const override {
+    return has_known_class(scan.labels);
+  }
   [[nodiscard]] PointLabels segment(const Scan& scan) override;
 
  private:

@@ -34,7 +34,9 @@ SweepMerger::Config merging_of(const ServerConfig& config) {
   const bool every = config.input.delivery == DeliveryMode::every;
   return {.lidars = config.lidars.size(),
           .period_s = config.mapper.sensor.period_s,
-          .max_wait_s = every ? std::max(wait_s, min_lossless_wait_s) : wait_s};
+          .max_wait_s = every ? std::max(wait_s, min_lossless_wait_s) : wait_s,
+          .partial_labels = config.labels.source == LabelProvider::automatic ? PartialLabels::drop
+                                                                             : PartialLabels::keep};
 }
 
 // What is too near or too far for each lidar itself.
@@ -146,6 +148,12 @@ void SweepInput::queue(SweepMerger::Sweep sweep, const std::stop_token& stop) {
     throttled_log_.warn("lidar_" + name, "no scan of lidar '" + name + "' on " +
                                              lidars_[lidar].topic +
                                              " in time: the sweep goes on without it");
+  }
+  if (sweep.is_partly_labelled) {
+    statistics_.count("sweeps_partly_labelled");
+    throttled_log_.warn("partly_labelled",
+                        "some lidars send labels and others do not: with labels.source 'auto' the "
+                        "network labels all points, with 'stream' those of the others have none");
   }
   statistics_.scan_received();
   QueuedScan queued{std::move(sweep.scan), frame_, Clock::now()};

@@ -86,6 +86,15 @@ TEST(KittiSequenceWriter, WhatIsWrittenComesBack) {
   }
 }
 
+TEST(ScanDataset, TakesAFieldThatNobodyFilledForNoLabels) {
+  const ScratchFolder folder;
+  KittiSequenceWriter writer(folder.path());
+  const std::vector<std::uint32_t> unfilled(3, 0);
+  for (int k = 0; k < 3; ++k) writer.add(small_scan(3, 100 * k), unfilled, pose_at(k, 0.0));
+  writer.finish();
+  EXPECT_FALSE(ScanDataset(folder.path()).has_labels());
+}
+
 TEST(KittiSequenceWriter, TruthIsInTheFirstLidarFrame) {
   const ScratchFolder folder;
   KittiSequenceWriter writer(folder.path());

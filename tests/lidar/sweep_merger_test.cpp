@@ -56,9 +56,22 @@ TEST(MergedScan, FillsUpWhatOneLidarDoesNotHave) {
   front.labels = {SemanticClass::car};
   front.ring = {7};
   const Scan merged = merged_scan({scan_at(1000, 2.0F), front});
-  EXPECT_THAT(merged.intensity, ElementsAre(0.0F, 0.5F));
+  EXPECT_THAT(merged.intensity, ElementsAre(0.5F, 0.5F)) << "dark would be an observation";
   EXPECT_THAT(merged.labels, ElementsAre(SemanticClass::unlabeled, SemanticClass::car));
   EXPECT_THAT(merged.ring, IsEmpty());
+}
+
+TEST(MergedScan, LeavesLabelsOfSomeLidarsOutWhereAskedTo) {
+  Scan labelled = scan_at(1000, 1.0F);
+  labelled.labels = {SemanticClass::car};
+  Scan unfilled = scan_at(1000, 2.0F);
+  unfilled.labels = {SemanticClass::unlabeled};
+  const auto drop = PartialLabels::drop;
+  EXPECT_THAT(merged_scan({labelled, scan_at(1000, 2.0F)}, drop).labels, IsEmpty());
+  EXPECT_THAT(merged_scan({labelled, unfilled}, drop).labels, IsEmpty());
+  EXPECT_THAT(merged_scan({unfilled, unfilled}, drop).labels, IsEmpty());
+  EXPECT_THAT(merged_scan({labelled, labelled}, drop).labels,
+              ElementsAre(SemanticClass::car, SemanticClass::car));
 }
 
 TEST(MergedScan, OfNothingIsEmpty) { EXPECT_TRUE(merged_scan({}).empty()); }
@@ -119,6 +132,17 @@ TEST_F(Merger, WaitsForTheOtherLidar) {
   EXPECT_THAT(xs(sweep->scan), ElementsAre(1.0F, 2.0F));
   EXPECT_THAT(sweep->missing, IsEmpty());
   EXPECT_FALSE(merger_.next(10.0));
+}
+
+TEST_F(Merger, TellsThatOnlySomeLidarsSendLabels) {
+  Scan labelled = scan_at(1000, 1.0F);
+  labelled.labels = {SemanticClass::car};
+  EXPECT_EQ(merger_.add(0, labelled, 0.0), 0U);
+  EXPECT_EQ(merger_.add(1, scan_at(1000, 2.0F), 0.0), 0U);
+  const auto sweep = merger_.next(0.0);
+  ASSERT_TRUE(sweep);
+  EXPECT_TRUE(sweep->is_partly_labelled);
+  EXPECT_THAT(sweep->scan.labels, ElementsAre(SemanticClass::car, SemanticClass::unlabeled));
 }
 
 TEST_F(Merger, PairsScansByStampNotByArrival) {

@@ -26,6 +26,12 @@ TEST(PassthroughSegmenter, HasNoneForAScanWithoutLabels) {
   EXPECT_TRUE(PassthroughSegmenter().segment(scan).empty());
 }
 
+TEST(PassthroughSegmenter, HasNoneForAFieldThatNobodyFilled) {
+  Scan scan = labelled_scan();
+  scan.labels.assign(scan.size(), SemanticClass::unlabeled);
+  EXPECT_TRUE(PassthroughSegmenter().segment(scan).empty());
+}
+
 TEST(NullSegmenter, IgnoresLabelsThatAreThere) {
   EXPECT_TRUE(NullSegmenter().segment(labelled_scan()).empty());
   EXPECT_EQ(NullSegmenter().name(), "none");
@@ -47,6 +53,15 @@ TEST(FallbackSegmenter, UsesTheFallbackOnlyForScansWithoutLabels) {
   Scan scan = labelled_scan();
   scan.labels.clear();
   EXPECT_EQ(labels.segment(scan).classes[1], SemanticClass::car);
+}
+
+TEST(FallbackSegmenter, UsesTheFallbackWhereNoClassIsKnown) {
+  FallbackSegmenter labels(std::make_unique<AllCars>());
+  Scan scan = labelled_scan();
+  EXPECT_TRUE(labels.has_labels(scan));
+  scan.labels.assign(scan.size(), SemanticClass::unlabeled);
+  EXPECT_FALSE(labels.has_labels(scan));
+  EXPECT_EQ(labels.segment(scan).classes[0], SemanticClass::car);
 }
 
 }  // namespace

@@ -53,5 +53,29 @@ TEST(SweepInput, CutsAllToTheRangesOfTheConfiguration) {
   EXPECT_THAT(left_of_sweep(config), ElementsAre(1.0F, 10.0F, 50.0F, 1.0F, 10.0F));
 }
 
+/// Labels of a sweep for which the front lidar alone sends some.
+std::vector<SemanticClass> labels_of_sweep(LabelProvider source, Statistics& statistics) {
+  ServerConfig config = front_and_rear();
+  config.labels.source = source;
+  ScanQueue queue(3);
+  SweepInput sweeps(config, queue, statistics);
+  Scan front = points_ahead({10.0F});
+  front.labels = {SemanticClass::car};
+  sweeps.add(0, std::move(front), {});
+  sweeps.add(1, points_ahead({10.0F}), {});
+  const auto queued = queue.try_pop();
+  return queued ? queued->scan.labels : std::vector{SemanticClass::pole};
+}
+
+TEST(SweepInput, LeavesSweepsThatAreLabelledInPartToTheNetworkWhereThereIsOne) {
+  Statistics statistics;
+  EXPECT_THAT(labels_of_sweep(LabelProvider::automatic, statistics), testing::IsEmpty());
+  EXPECT_THAT(labels_of_sweep(LabelProvider::stream, statistics),
+              ElementsAre(SemanticClass::car, SemanticClass::unlabeled));
+  dds::ServerStatus status;
+  statistics.report_to(status);
+  EXPECT_EQ(status.counter("sweeps_partly_labelled"), 2U);
+}
+
 }  // namespace
 }  // namespace stillmap::server
