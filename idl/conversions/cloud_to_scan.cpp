@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -80,16 +82,6 @@ std::optional<PointColumn> find_column(const PointCloud2& cloud,
   return std::nullopt;
 }
 
-std::optional<PointColumn> find_integer_column(const PointCloud2& cloud,
-                                               const std::vector<std::string>& names) {
-  auto column = find_column(cloud, names);
-  if (column && !is_integer(column->type)) {
-    refuse("bad_field", "field " + names.front() + " has a floating-point datatype; it needs an " +
-                            "integer one");
-  }
-  return column;
-}
-
 PointColumn coordinate(const PointCloud2& cloud, const std::vector<std::string>& names) {
   const auto column = find_column(cloud, names);
   if (!column) refuse("no_xyz", "there is no field " + names.front() + "; x, y and z are needed");
@@ -133,7 +125,8 @@ CloudLayout layout_of(const PointCloud2& cloud, const PointFieldNames& names) {
           // Some simulators number the rings in floats.
           .ring = find_column(cloud, names.ring),
           .time = find_column(cloud, names.time),
-          .label = find_integer_column(cloud, names.label)};
+          // Some tools write every field as a float.
+          .label = find_column(cloud, names.label)};
 }
 
 /// Checks how a cloud describes itself against its data. Any input is fine.
@@ -216,19 +209,40 @@ SemanticClass class_of(std::uint32_t value, bool is_class) {
                                       : SemanticClass::unlabeled;
 }
 
-/// SemanticKITTI's ids need more than 8 bits: a field of 8 is something else.
-bool holds_labels(const PointColumn& column, bool are_classes) {
-  return are_classes || size_of(column.type) > 1;
+/// A label as it is in the field. No number is 0, as padding points of organised clouds have it;
+/// nothing for one that no field of whole numbers could hold.
+template <typename T>
+std::optional<std::uint32_t> whole_label(T value) {
+  if constexpr (std::is_integral_v<T>) {
+    return static_cast<std::uint32_t>(value);
+  } else {
+    if (!std::isfinite(value)) return 0U;
+    const auto label = static_cast<double>(value);
+    if (label < 0.0 || label > 4294967295.0 || label != std::floor(label)) return std::nullopt;
+    return static_cast<std::uint32_t>(label);
+  }
 }
 
-std::vector<SemanticClass> read_labels(const PointCloud2& cloud, const CloudLayout& layout,
-                                       bool are_classes) {
-  if (!layout.label || !holds_labels(*layout.label, are_classes)) return {};
-  std::vector<SemanticClass> labels(layout.points());
+/// The labels of a cloud and what their field was taken for; empty without such a field.
+struct ReadLabels {
+  std::vector<SemanticClass> classes;
+  std::string remark;
+};
+
+ReadLabels read_labels(const PointCloud2& cloud, const CloudLayout& layout, bool are_classes) {
+  if (!layout.label) return {};
+  // SemanticKITTI's ids need more than 8 bits: a field of 8 is something else.
+  if (!are_classes && size_of(layout.label->type) == 1) return {{}, "ignored"};
+  ReadLabels read{.classes = std::vector<SemanticClass>(layout.points()),
+                  .remark = are_classes ? "classes" : "SemanticKITTI ids"};
+  bool are_whole = true;
   for_each_value(cloud, layout, *layout.label, [&](std::size_t i, auto value) {
-    labels[i] = class_of(static_cast<std::uint32_t>(value), are_classes);
+    const std::optional<std::uint32_t> label = whole_label(value);
+    are_whole &= label.has_value();
+    read.classes[i] = class_of(label.value_or(0), are_classes);
   });
-  return labels;
+  if (!are_whole) return {{}, "ignored: not whole numbers"};
+  return read;
 }
 
 /// "intensity from reflectivity (uint16)", or what goes without it.
@@ -241,14 +255,12 @@ std::string source_of(const char* what, const std::optional<PointColumn>& column
   return text.append(")");
 }
 
-std::string describe(const CloudLayout& layout, const PointTimes& times, bool labels_are_classes) {
+std::string describe(const CloudLayout& layout, const PointTimes& times, const ReadLabels& labels) {
   std::string text = source_of("intensity", layout.intensity) + ", " +
                      source_of("time", layout.time, times.remark) + ", " +
                      source_of("ring", layout.ring);
   if (!layout.label) return text;
-  const bool is_used = holds_labels(*layout.label, labels_are_classes);
-  const char* const kind = labels_are_classes ? "classes" : "SemanticKITTI ids";
-  return text + ", " + source_of("label", layout.label, is_used ? kind : "ignored");
+  return text + ", " + source_of("label", layout.label, labels.remark);
 }
 
 }  // namespace
@@ -265,13 +277,14 @@ ScanFromCloud to_scan(const PointCloud2& cloud, const CloudReadOptions& options)
   const auto [layout, fault] = check_layout(cloud, options.fields);
   if (!layout) return {.scan = std::nullopt, .fault = fault, .format = {}};
   PointTimes times = read_time(cloud, *layout, *stamp);
-  std::string format = describe(*layout, times, options.labels_are_classes);
+  ReadLabels labels = read_labels(cloud, *layout, options.labels_are_classes);
+  std::string format = describe(*layout, times, labels);
   return {.scan = Scan{.stamp_ns = *stamp,
                        .points_lidar = read_points(cloud, *layout),
                        .intensity = read_intensity(cloud, *layout, options.intensity_scale),
                        .time_offset_s = std::move(times.offsets_s),
                        .ring = read_ring(cloud, *layout),
-                       .labels = read_labels(cloud, *layout, options.labels_are_classes)},
+                       .labels = std::move(labels.classes)},
           .fault = {},
           .format = std::move(format)};
 }

@@ -16,7 +16,7 @@ struct CloudReadOptions {
   float intensity_scale = 1.0F;
   /// The label field holds classes 0..19; otherwise original SemanticKITTI ids, of which only the
   /// class is kept (moving-car becomes car). Then a field of 8 bits is something else: it is left
-  /// out.
+  /// out, as one of floats that are not all whole numbers always is.
   bool labels_are_classes = false;
 };
 

@@ -231,6 +231,26 @@ TEST(CloudToScan, LabelsOf8BitsAreNoSemanticKittiIds) {
   }
 }
 
+TEST(CloudToScan, TakesLabelsInFloatsWhereTheyAreWholeNumbers) {
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  const auto whole = three_points_with<float>("label", FieldType::float32, {40.0F, nan, 252.0F});
+  const ScanFromCloud back = to_scan(whole, {});
+  ASSERT_TRUE(back.scan) << back.fault.reason;
+  EXPECT_THAT(back.scan->labels,
+              ElementsAre(SemanticClass::road, SemanticClass::unlabeled, SemanticClass::car));
+  EXPECT_THAT(back.format, HasSubstr("label from label (float32: SemanticKITTI ids)"));
+}
+
+TEST(CloudToScan, LeavesLabelsInFloatsOutThatAreNoWholeNumbers) {
+  for (const double odd : {0.5, -1.0, 1e300}) {
+    const auto cloud = three_points_with<double>("label", FieldType::float64, {40.0, odd, 50.0});
+    const ScanFromCloud back = to_scan(cloud, {});
+    ASSERT_TRUE(back.scan) << "the points are to be mapped all the same: " << back.fault.reason;
+    EXPECT_TRUE(back.scan->labels.empty()) << odd;
+    EXPECT_THAT(back.format, HasSubstr("label from label (float64: ignored: not whole numbers)"));
+  }
+}
+
 TEST(CloudToScan, SaysWhatTheLabelFieldIsTakenFor) {
   const auto bytes = three_points_with<std::uint8_t>("label", FieldType::uint8, {1, 2, 3});
   const auto ids = three_points_with<std::uint32_t>("label", FieldType::uint32, {10, 40, 50});

@@ -76,11 +76,6 @@ INSTANTIATE_TEST_SUITE_P(
                     [](auto& c) { c.fields()[0].count(3); }},
         HostileCase{"NoValueAField", "bad_field", "count 0",
                     [](auto& c) { c.fields()[0].count(0); }},
-        HostileCase{"LabelAsFloat", "bad_field", "label",
-                    [](auto& c) {
-                      c.fields().push_back(c.fields()[0]);
-                      c.fields().back().name("label");
-                    }},
         HostileCase{"StampBeyondASecond", "bad_stamp", "nanosec",
                     [](auto& c) { c.header().stamp().nanosec(1'000'000'000); }}),
     [](const auto& info) { return std::string(info.param.name); });
