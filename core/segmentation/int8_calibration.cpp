@@ -141,6 +141,22 @@ void multiply_inputs(Convolution& c, const Factors& factors) {
 
 }  // namespace
 
+std::string calibration_fault(const NetworkGraph& graph, const Int8Calibration& calibration) {
+  for (const Tensor& tensor : graph.tensors) {
+    const auto known = calibration.range_of_channels.find(tensor.name);
+    if (known == calibration.range_of_channels.end()) continue;
+    const std::vector<float>& ranges = known->second;
+    const auto channels = static_cast<std::size_t>(tensor.shape.channels);
+    const std::string entry = "ranges: '" + tensor.name + "' has ";
+    if (ranges.size() != channels)
+      return entry + std::to_string(ranges.size()) + " numbers, and the tensor " +
+             std::to_string(channels) + " channels";
+    if (std::ranges::all_of(ranges, [](float range) { return range <= 0.0F; }))
+      return entry + std::to_string(channels) + " zeros: no scan could be segmented with them";
+  }
+  return {};
+}
+
 Int8Calibration equalise_channels(NetworkGraph& graph, const Int8Calibration& calibration) {
   const TensorGroups groups(graph);
   const std::vector<Factors> factors = factors_of_groups(graph, groups, calibration);

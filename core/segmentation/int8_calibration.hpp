@@ -43,6 +43,11 @@ class ActivationRanges {
   std::map<std::string, std::vector<Histogram>> channels_of_tensor_;
 };
 
+/// Why this calibration is not one of this network (after infer_shapes()), with the tensor and the
+/// numbers; empty where it is. Tensors without an entry are no fault here: some need none.
+[[nodiscard]] std::string calibration_fault(const NetworkGraph& graph,
+                                            const Int8Calibration& calibration);
+
 /// Cross-layer equalisation (M. Nagel et al., ICCV 2019): scales the channels of each tensor to
 /// about the same range, since int8 has one scale for all channels of a tensor. The weights that
 /// produce a channel are divided by its range, those that read it are multiplied by it.
@@ -50,7 +55,7 @@ class ActivationRanges {
 /// not change. Tensors that are added share their factors; the network's input and output, and
 /// tensors added to them, keep their scale, and so do tensors without an entry in the calibration.
 ///
-/// Returns the calibration of the changed graph.
+/// The calibration has no calibration_fault(). Returns that of the changed graph.
 Int8Calibration equalise_channels(NetworkGraph& graph, const Int8Calibration& calibration);
 
 }  // namespace stillmap

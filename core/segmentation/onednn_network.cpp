@@ -27,6 +27,12 @@ std::unique_ptr<CompiledPlan> compile(Precision precision, NetworkGraph& graph,
           "has no int8.yaml beside it; make it with 'stillmap model calibrate', or use "
           "precision: fp32");
     }
+    if (const std::string fault = calibration_fault(graph, *model.int8); !fault.empty()) {
+      throw ModelError(model.network_file.parent_path() / "int8.yaml",
+                       fault +
+                           "; the file is damaged or another network's: calibrate again with "
+                           "'stillmap model calibrate', or use precision: fp32");
+    }
     calibration = equalise_channels(graph, *model.int8);
   }
   const auto compiled = [&](FloatSummand float_summand) {

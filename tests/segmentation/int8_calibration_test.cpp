@@ -7,6 +7,8 @@
 #include <limits>
 #include <random>
 
+#include "core/segmentation/graph/network_graph.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -50,6 +52,34 @@ TEST(ActivationRanges, DoNotCountWhatIsNoNumber) {
                                 std::numeric_limits<float>::infinity()},
              1);
   EXPECT_EQ(ranges.ranges(1.0).at("x"), std::vector{1.0F});
+}
+
+NetworkGraph graph_of_two_tensors() {
+  NetworkGraph graph;
+  graph.tensors = {{.name = "a", .shape = {.channels = 2, .rows = 4, .columns = 4}},
+                   {.name = "b", .shape = {.channels = 1, .rows = 4, .columns = 4}}};
+  return graph;
+}
+
+TEST(Int8Calibration, FitsANetworkOfTheSameTensors) {
+  const NetworkGraph graph = graph_of_two_tensors();
+  // A channel may have been 0 in all scans, a tensor may need no range, and others are not read.
+  for (const Ranges& ranges : {Ranges{{"a", {0.0F, 1.0F}}, {"b", {2.0F}}}, Ranges{{"b", {2.0F}}},
+                               Ranges{{"c", {1.0F, 2.0F, 3.0F}}}})
+    EXPECT_EQ(
+        calibration_fault(graph, {.made = "", .range_of_channels = ranges, .float_layers = {}}),
+        "");
+}
+
+TEST(Int8Calibration, IsDamagedWithOtherCountsOrNothingButZeros) {
+  const NetworkGraph graph = graph_of_two_tensors();
+  const auto fault = [&](const Ranges& ranges) {
+    return calibration_fault(graph, {.made = "", .range_of_channels = ranges, .float_layers = {}});
+  };
+  EXPECT_EQ(fault({{"a", {1.0F}}}), "ranges: 'a' has 1 numbers, and the tensor 2 channels");
+  EXPECT_EQ(fault({{"b", {}}}), "ranges: 'b' has 0 numbers, and the tensor 1 channels");
+  EXPECT_EQ(fault({{"a", {0.0F, 0.0F}}, {"b", {2.0F}}}),
+            "ranges: 'a' has 2 zeros: no scan could be segmented with them");
 }
 
 }  // namespace

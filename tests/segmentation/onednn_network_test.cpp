@@ -218,6 +218,27 @@ TEST(OneDnnNetwork, NamesTheOperatorAndTheWayOutWhenItCannotRunAModel) {
   EXPECT_THAT(refusal(model), HasSubstr("engine: opencv"));
 }
 
+TEST(OneDnnNetwork, RefusesADamagedCalibration) {
+  ModelDescription model = written(test::light_bytes(8, 8, 32, classes), 8, 32);
+  const Int8Calibration sound = calibrate(model, 1);
+  const auto refused_with = [&](const auto& damage) -> std::string {
+    model.int8 = sound;
+    for (auto& [tensor, ranges] : model.int8->range_of_channels) damage(ranges);
+    try {
+      const OneDnnNetwork network(model, Precision::int8);
+      return {};
+    } catch (const ModelError& error) {
+      return error.what();
+    }
+  };
+  const std::string zeros = refused_with([](auto& ranges) { std::ranges::fill(ranges, 0.0F); });
+  EXPECT_THAT(zeros, HasSubstr("int8.yaml: ranges: '"));
+  EXPECT_THAT(zeros, HasSubstr("zeros"));
+  EXPECT_THAT(zeros, HasSubstr("stillmap model calibrate"));
+  EXPECT_THAT(refused_with([](auto& ranges) { ranges.pop_back(); }), HasSubstr("channels"));
+  EXPECT_EQ(refused_with([](auto&) {}), "");
+}
+
 TEST(OneDnnNetwork, SaysHowToCalibrateWhenThereIsNoCalibration) {
   ModelDescription model = written(test::light_bytes(8, 8, 32, classes), 8, 32);
   EXPECT_THAT(refusal(model, Precision::int8), HasSubstr("stillmap model calibrate"));
