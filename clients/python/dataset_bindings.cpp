@@ -121,13 +121,15 @@ struct SharedRecording {
 void bind_open_dataset(py::module_& module) {
   module.def(
       "open_dataset",
-      [](const std::filesystem::path& path, const std::string& topic) {
+      [](const std::filesystem::path& path, const std::string& topic, bool labels_are_classes) {
         const py::gil_scoped_release released;
-        return std::make_unique<SharedRecording>(dds::open_recording(path, topic));
+        const auto kind = labels_are_classes ? std::optional(LabelKind::classes) : std::nullopt;
+        return std::make_unique<SharedRecording>(dds::open_recording(path, topic, kind));
       },
-      py::arg("path"), py::arg("topic") = "",
+      py::arg("path"), py::arg("topic") = "", py::arg("labels_are_classes") = false,
       "Opens a KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, or a ROS 2 bag "
-      "(SQLite or MCAP). topic: of a bag with several topics of scans. Raises DatasetError.");
+      "(SQLite or MCAP). topic: of a bag with several topics of scans. labels_are_classes: "
+      "its labels are classes 0 to 19, not SemanticKITTI's ids. Raises DatasetError.");
 }
 
 }  // namespace

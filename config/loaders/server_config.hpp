@@ -10,6 +10,7 @@
 #include "config/loaders/config_report.hpp"
 #include "config/loaders/dds_profile.hpp"
 #include "core/lidar/delivery_mode.hpp"
+#include "core/lidar/label_kind.hpp"
 #include "core/lidar/point_fields.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/mapper.hpp"
@@ -122,14 +123,6 @@ struct GnssReceiverConfig {
   std::optional<Eigen::Vector3d> antenna_base;
   /// Fixes that are said to be worse than this, east and north, are not used [m].
   double max_sigma_m = 20.0;
-};
-
-/// What the numbers in a cloud's label field are.
-enum class LabelKind {
-  /// Original SemanticKITTI ids (10 = car); moving ids are reduced to their class.
-  semantic_kitti,
-  /// Stillmap's classes, 0..19.
-  classes,
 };
 
 struct InputConfig {

@@ -170,7 +170,8 @@ SensorModel guess_sensor(const Scan& scan, bool kitti_file) {
 
 }  // namespace
 
-ScanDataset::ScanDataset(const fs::path& path) : files_(scans_of(path)), lines_(lines_of(files_)) {
+ScanDataset::ScanDataset(const fs::path& path, std::optional<LabelKind> label_kind)
+    : files_(scans_of(path)), lines_(lines_of(files_)), label_kind_(label_kind) {
   if (files_.front().parent_path().filename() == "velodyne") {
     sequence_ = files_.front().parent_path().parent_path();
   }
@@ -186,7 +187,9 @@ ScanDataset::ScanDataset(const fs::path& path) : files_(scans_of(path)), lines_(
   learn_from_sample();
 }
 
-ScanDataset::ScanDataset(std::shared_ptr<const ScanSource> source) : source_(std::move(source)) {
+ScanDataset::ScanDataset(std::shared_ptr<const ScanSource> source,
+                         std::optional<LabelKind> label_kind)
+    : source_(std::move(source)), label_kind_(label_kind) {
   for (std::size_t i = 0; i < source_->size(); ++i) {
     files_.push_back(source_->name(i));
     stamps_ns_.push_back(source_->stamp_ns(i));
@@ -209,11 +212,13 @@ void ScanDataset::learn_from_sample() {
   std::vector<std::pair<std::size_t, std::size_t>> readable;
   std::vector<float> full_scales;
   std::optional<DatasetError> fault;
+  const auto count_label = [this](std::uint32_t label) { label_census_.add(label); };
   bool brings_labels = false, is_any_known = false;
   for (const std::size_t i : sample()) {
     try {
       const DatasetFrame frame = read_unscaled(i);
       if (readable.empty()) brings_labels = !frame.raw_labels.empty();
+      if (!label_kind_) std::ranges::for_each(frame.raw_labels, count_label);
       is_any_known |= has_known_class(reduced_classes(frame.raw_labels));
       readable.emplace_back(frame.scan.size(), i);
       full_scales.push_back(intensity_full_scale(frame.scan.intensity));
@@ -275,6 +280,14 @@ bool ScanDataset::has_labels(std::size_t i) const {
 }
 
 DatasetFrame ScanDataset::read_unscaled(std::size_t i) const {
+  DatasetFrame frame = read_as_recorded(i);
+  if (label_kind_ != LabelKind::classes) return frame;
+  for (std::uint32_t& label : frame.raw_labels)
+    label = semantic_kitti_id(class_of_label(label, LabelKind::classes));
+  return frame;
+}
+
+DatasetFrame ScanDataset::read_as_recorded(std::size_t i) const {
   if (source_) return source_->read(i);
   if (file(i).extension() != ".bin") {
     auto [scan, raw_labels] = read_point_cloud(file(i), stamp_ns(i));

@@ -9,6 +9,7 @@
 
 #include "core/dataset/kitti_lidar.hpp"
 #include "core/dataset/scan_source.hpp"
+#include "core/lidar/label_kind.hpp"
 #include "core/lidar/scan.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/lidar/trajectory.hpp"
@@ -29,10 +30,13 @@ class ScanDataset {
  public:
   /// Throws DatasetError when there is no scan to be found, or none of some from all over it can be
   /// read.
-  explicit ScanDataset(const std::filesystem::path& path);
+  /// `label_kind`: what the numbers in its labels are; nothing: SemanticKITTI's, and label_census()
+  /// tells whether they look like them.
+  explicit ScanDataset(const std::filesystem::path& path, std::optional<LabelKind> label_kind = {});
 
   /// Throws DatasetError when there is no scan, or none of some from all over it can be read.
-  explicit ScanDataset(std::shared_ptr<const ScanSource> source);
+  explicit ScanDataset(std::shared_ptr<const ScanSource> source,
+                       std::optional<LabelKind> label_kind = {});
 
   [[nodiscard]] std::size_t size() const { return files_.size(); }
   [[nodiscard]] const std::filesystem::path& file(std::size_t i) const { return files_.at(i); }
@@ -43,6 +47,8 @@ class ScanDataset {
   /// Whether scans come with labels: as the first of some from all over the dataset that can be
   /// read. Labels without one known class, as where PCL's PointXYZL was saved unfilled, are none.
   [[nodiscard]] bool has_labels() const { return has_labels_; }
+  /// The labels of those scans, where nobody told of which kind they are; else none.
+  [[nodiscard]] const LabelCensus& label_census() const { return label_census_; }
   /// Whether this one does. Throws as read() does.
   [[nodiscard]] bool has_labels(std::size_t i) const;
 
@@ -74,6 +80,8 @@ class ScanDataset {
 
  private:
   [[nodiscard]] DatasetFrame read_unscaled(std::size_t i) const;
+  /// With raw labels as they are in the file or message.
+  [[nodiscard]] DatasetFrame read_as_recorded(std::size_t i) const;
   [[nodiscard]] std::filesystem::path beside(std::size_t i, const char* folder,
                                              const char* extension) const;
 
@@ -93,6 +101,8 @@ class ScanDataset {
   /// Line of each scan in times.txt and the pose files.
   std::vector<std::size_t> lines_;
   std::vector<std::int64_t> stamps_ns_;
+  std::optional<LabelKind> label_kind_;
+  LabelCensus label_census_;
   float intensity_scale_ = 1.0F;
   bool has_labels_ = false;
   SensorModel suggested_sensor_;

@@ -18,7 +18,7 @@ struct DatasetFrame {
   /// With the labels reduced to the network's classes, where the dataset has labels.
   Scan scan;
   /// Original SemanticKITTI labels: moving ids in the low, instances in the high 16 bits. Truth for
-  /// evaluation only. Empty without labels.
+  /// evaluation only. Empty without labels. From a ScanSource: as the source has them.
   std::vector<std::uint32_t> raw_labels;
 };
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,7 +19,8 @@ class BagScanSource final : public ScanSource {
  public:
   /// `topic` may be empty when the bag has only one topic of scans, and go without its slash.
   /// Throws DatasetError, which lists the topics.
-  BagScanSource(const std::filesystem::path& path, const std::string& topic);
+  BagScanSource(const std::filesystem::path& path, const std::string& topic,
+                LabelKind label_kind = LabelKind::semantic_kitti);
 
   [[nodiscard]] const BagTopic& topic() const { return topic_; }
   [[nodiscard]] std::size_t size() const override { return messages_.size(); }
@@ -47,6 +49,7 @@ class BagScanSource final : public ScanSource {
   Bag bag_;
   BagTopic topic_;
   ScanMessageType kind_;
+  LabelKind label_kind_;
   std::vector<BagMessage> messages_;
   std::vector<std::int64_t> stamps_ns_;
   std::optional<SensorModel> sensor_;
@@ -59,9 +62,10 @@ struct Recording {
 };
 
 /// A recording of whatever kind: a bag, or what ScanDataset reads. `topic` is for bags alone.
-/// Throws DatasetError.
+/// `label_kind`: see ScanDataset. Throws DatasetError.
 [[nodiscard]] Recording open_recording(const std::filesystem::path& path,
-                                       const std::string& topic = {});
+                                       const std::string& topic = {},
+                                       std::optional<LabelKind> label_kind = {});
 /// The same without its faults.
 [[nodiscard]] ScanDataset open_sequence(const std::filesystem::path& path,
                                         const std::string& topic = {});

@@ -55,16 +55,15 @@ sensor_msgs::msg::PointCloud2 read_cloud(CdrReader cdr) {
   return cloud;
 }
 
-DecodedScan from_cloud(CdrReader cdr) {
+DecodedScan from_cloud(CdrReader cdr, LabelKind label_kind) {
   const sensor_msgs::msg::PointCloud2 cloud = read_cloud(cdr);
-  auto [scan, fault, understood] = wire::to_scan(cloud, {});
-  if (!scan) throw CdrError(fault.reason);
-  DecodedScan read{.frame = {.scan = *std::move(scan), .raw_labels = {}}, .sensor = {}};
-  // SemanticKITTI ids, as Stillmap's own replay sends them.
-  for (const SemanticClass label : read.frame.scan.labels) {
-    read.frame.raw_labels.push_back(semantic_kitti_id(label));
-  }
-  return read;
+  wire::ScanFromCloud read =
+      wire::to_scan(cloud, {.fields = {},
+                            .labels_are_classes = label_kind == LabelKind::classes,
+                            .keeps_raw_labels = true});
+  if (!read.scan) throw CdrError(read.fault.reason);
+  return {.frame = {.scan = *std::move(read.scan), .raw_labels = std::move(read.raw_labels)},
+          .sensor = {}};
 }
 
 DecodedScan from_velodyne_packets(CdrReader cdr) {
@@ -118,11 +117,12 @@ std::optional<ScanMessageType> scan_message_type(std::string_view type) {
   return std::nullopt;
 }
 
-DecodedScan decode_scan(ScanMessageType kind, std::span<const std::uint8_t> message) {
+DecodedScan decode_scan(ScanMessageType kind, std::span<const std::uint8_t> message,
+                        LabelKind label_kind) {
   const CdrReader cdr(message);
   switch (kind) {
     case ScanMessageType::point_cloud:
-      return from_cloud(cdr);
+      return from_cloud(cdr, label_kind);
     case ScanMessageType::velodyne_packets:
       return from_velodyne_packets(cdr);
     case ScanMessageType::livox_points:

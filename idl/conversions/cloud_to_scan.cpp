@@ -200,15 +200,6 @@ PointTimes read_time(const PointCloud2& cloud, const CloudLayout& layout, std::i
   return point_times(times, time_type(layout.time->type), stamp);
 }
 
-SemanticClass class_of(std::uint32_t value, bool is_class) {
-  if (!is_class) {
-    // The upper half of a SemanticKITTI label is the instance.
-    return class_from_semantic_kitti(static_cast<std::uint16_t>(value & 0xFFFFU));
-  }
-  return value < semantic_class_count ? static_cast<SemanticClass>(value)
-                                      : SemanticClass::unlabeled;
-}
-
 /// A label as it is in the field. No number is 0, as padding points of organised clouds have it;
 /// nothing for one that no field of whole numbers could hold.
 template <typename T>
@@ -227,10 +218,15 @@ std::optional<std::uint32_t> whole_label(T value) {
 struct ReadLabels {
   std::vector<SemanticClass> classes;
   std::string remark;
+  LabelCensus census = {};
+  std::vector<std::uint32_t> raw = {};
 };
 
-ReadLabels read_labels(const PointCloud2& cloud, const CloudLayout& layout, bool are_classes) {
+ReadLabels read_labels(const PointCloud2& cloud, const CloudLayout& layout,
+                       const CloudReadOptions& options) {
   if (!layout.label) return {};
+  const bool are_classes = options.labels_are_classes;
+  const LabelKind kind = are_classes ? LabelKind::classes : LabelKind::semantic_kitti;
   // SemanticKITTI's ids need more than 8 bits: a field of 8 is something else.
   if (!are_classes && size_of(layout.label->type) == 1) return {{}, "ignored"};
   ReadLabels read{.classes = std::vector<SemanticClass>(layout.points()),
@@ -239,7 +235,9 @@ ReadLabels read_labels(const PointCloud2& cloud, const CloudLayout& layout, bool
   for_each_value(cloud, layout, *layout.label, [&](std::size_t i, auto value) {
     const std::optional<std::uint32_t> label = whole_label(value);
     are_whole &= label.has_value();
-    read.classes[i] = class_of(label.value_or(0), are_classes);
+    read.classes[i] = class_of_label(label.value_or(0), kind);
+    if (!are_classes) read.census.add(label.value_or(0));
+    if (options.keeps_raw_labels) read.raw.push_back(label.value_or(0));
   });
   if (!are_whole) return {{}, "ignored: not whole numbers"};
   return read;
@@ -277,7 +275,7 @@ ScanFromCloud to_scan(const PointCloud2& cloud, const CloudReadOptions& options)
   const auto [layout, fault] = check_layout(cloud, options.fields);
   if (!layout) return {.scan = std::nullopt, .fault = fault, .format = {}};
   PointTimes times = read_time(cloud, *layout, *stamp);
-  ReadLabels labels = read_labels(cloud, *layout, options.labels_are_classes);
+  ReadLabels labels = read_labels(cloud, *layout, options);
   std::string format = describe(*layout, times, labels);
   return {.scan = Scan{.stamp_ns = *stamp,
                        .points_lidar = read_points(cloud, *layout),
@@ -286,7 +284,9 @@ ScanFromCloud to_scan(const PointCloud2& cloud, const CloudReadOptions& options)
                        .ring = read_ring(cloud, *layout),
                        .labels = std::move(labels.classes)},
           .fault = {},
-          .format = std::move(format)};
+          .format = std::move(format),
+          .label_census = labels.census,
+          .raw_labels = std::move(labels.raw)};
 }
 
 CloudReader::CloudReader(const CloudReadOptions& options)

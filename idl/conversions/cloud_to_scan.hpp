@@ -2,7 +2,9 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "core/lidar/label_kind.hpp"
 #include "core/lidar/point_fields.hpp"
 #include "core/lidar/scan.hpp"
 #include "idl/msg/wire_types.hpp"
@@ -18,6 +20,8 @@ struct CloudReadOptions {
   /// class is kept (moving-car becomes car). Then a field of 8 bits is something else: it is left
   /// out, as one of floats that are not all whole numbers always is.
   bool labels_are_classes = false;
+  /// The labels as they are in the field are wanted, too.
+  bool keeps_raw_labels = false;
 };
 
 /// Why a cloud cannot be used.
@@ -36,6 +40,10 @@ struct ScanFromCloud {
   /// (uint32: ns from the stamp), ring from ring (uint8)", and where there is a label field what it
   /// is taken for: "label from label (uint8: ignored)".
   std::string format;
+  /// Of labels that were read as SemanticKITTI ids; else none.
+  LabelCensus label_census = {};
+  /// Numbers of the label field, where it is used and they are wanted; else empty.
+  std::vector<std::uint32_t> raw_labels = {};
 };
 
 /// Reads a cloud of any field types and byte order; any input is fine. Points that are not finite

@@ -272,11 +272,12 @@ void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std:
                     "', which no lidar of 'sensors' on this topic has");
   }
   auto [from_cloud, cloud_changes] = lidar->reader.read(cloud);
-  auto& [scan, fault, understood] = from_cloud;
+  auto& scan = from_cloud.scan;
   if (!scan) {
-    statistics_.bad_cloud(fault.counter);
-    return drop("bad_cloud", 1, "bad cloud: " + fault.reason);
+    statistics_.bad_cloud(from_cloud.fault.counter);
+    return drop("bad_cloud", 1, "bad cloud: " + from_cloud.fault.reason);
   }
+  report_labels(*lidar, from_cloud.label_census);
   report(*lidar, cloud_changes, *scan);
   if (sweeps_ != nullptr) return sweeps_->add(lidar->index, *std::move(scan), stop);
   queue_scan({*std::move(scan), frame, received,
@@ -295,6 +296,19 @@ void ScanReceiver::queue_scan(QueuedScan queued, const std::stop_token& stop) {
   if (dropped > 0) {
     drop("queue_full", dropped, "scans arrive faster than they can be mapped");
   }
+}
+
+void ScanReceiver::report_labels(const Lidar& lidar, const LabelCensus& census) {
+  if (census.unknown() > 0) statistics_.count("unknown_labels", census.unknown());
+  if (!census.look_like_classes()) return;
+  statistics_.count("labels_look_like_classes");
+  // A line for each lidar: every scan says the same.
+  if (!layouts_.add(lidar.name + " label kind")) return;
+  spdlog::warn(
+      "labels on {} are read as SemanticKITTI ids and look like classes 0 to 19: set "
+      "'input.label_kind: classes', or 'labels.source: model' to do without them; counted as "
+      "labels_look_like_classes",
+      topic_);
 }
 
 void ScanReceiver::report(Lidar& lidar, const std::string& cloud_changes, const Scan& scan) {

@@ -106,6 +106,8 @@ class ScanReceiver {
   /// Counts the scans that are missing before this one.
   void count_losses(const eprosima::fastrtps::rtps::SampleIdentity& scan);
   void accept(const sensor_msgs::msg::PointCloud2& cloud, const std::stop_token& stop);
+  /// Counts ids that SemanticKITTI does not have, and says once where its ids are none.
+  void report_labels(const Lidar& lidar, const LabelCensus& census);
   /// Logs changes of the cloud's layout, and now and then checks that scans fit the sensor model.
   void report(Lidar& lidar, const std::string& cloud_changes, const Scan& scan);
   /// By the scan, where it tells the lidar.

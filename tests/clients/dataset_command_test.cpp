@@ -168,6 +168,30 @@ TEST_F(DatasetCommandTest, DoesNotWriteOverAnythingUnlessForced) {
   EXPECT_EQ(run(to_cloud + " --force").exit_code, 0);
 }
 
+TEST_F(DatasetCommandTest, RefusesClassesThatWouldBeReadAsIdsUntilItIsToldWhatTheyAre) {
+  simulate("city", 2);
+  const std::vector<std::uint32_t> ids = read_kitti_labels(
+      path("city/labels/000000.label"), content("city/labels/000000.label").size() / 4);
+  for (const char* scan : {"0", "1"}) {
+    const std::string file = std::string("city/labels/00000") + scan + ".label";
+    auto labels = read_kitti_labels(path(file), content(file).size() / 4);
+    for (std::uint32_t& label : labels)
+      label = static_cast<std::uint32_t>(class_from_semantic_kitti(label & 0xFFFFU));
+    write_kitti_labels(path(file), labels);
+  }
+  const std::string to_copy = "dataset export " + path("city") + " " + path("copy");
+  for (const std::string& command : {to_copy, "map " + path("city") + " --out " + path("map")}) {
+    const ProcessResult refused = run(command);
+    EXPECT_EQ(refused.exit_code, 2) << command;
+    EXPECT_THAT(refused.err, HasSubstr("--label-kind classes"));
+  }
+  ASSERT_EQ(run(to_copy + " --label-kind classes").exit_code, 0);
+  const auto copied = read_kitti_labels(path("copy/labels/000000.label"), ids.size());
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    ASSERT_EQ(class_from_semantic_kitti(copied[i] & 0xFFFFU),
+              class_from_semantic_kitti(ids[i] & 0xFFFFU));
+}
+
 TEST_F(DatasetCommandTest, NamesWhatItCannotUse) {
   simulate("city", 2);
   const auto refusal = [&](const std::string& arguments) {

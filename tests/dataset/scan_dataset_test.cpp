@@ -95,6 +95,27 @@ TEST(ScanDataset, TakesAFieldThatNobodyFilledForNoLabels) {
   EXPECT_FALSE(ScanDataset(folder.path()).has_labels());
 }
 
+TEST(ScanDataset, ReadsLabelsOfTheKindThatItIsTold) {
+  const ScratchFolder folder;
+  KittiSequenceWriter writer(folder.path());
+  // Vegetation and terrain as classes; 15 is a motorcycle as an id, and 17 is none.
+  writer.add(small_scan(3, 0), std::vector<std::uint32_t>{15, 17, 0}, pose_at(0, 0.0));
+  writer.finish();
+  const ScanDataset untold(folder.path());
+  EXPECT_TRUE(untold.label_census().look_like_classes());
+  EXPECT_EQ(untold.label_census().unknown(), 1U);
+  EXPECT_EQ(untold.read(0).scan.labels[0], SemanticClass::motorcycle);
+  EXPECT_FALSE(
+      ScanDataset(folder.path(), LabelKind::semantic_kitti).label_census().look_like_classes())
+      << "who says so is believed";
+  const ScanDataset classes(folder.path(), LabelKind::classes);
+  EXPECT_FALSE(classes.label_census().look_like_classes());
+  EXPECT_THAT(classes.read(0).raw_labels, ElementsAre(70U, 72U, 0U));
+  EXPECT_THAT(
+      classes.read(0).scan.labels,
+      ElementsAre(SemanticClass::vegetation, SemanticClass::terrain, SemanticClass::unlabeled));
+}
+
 TEST(KittiSequenceWriter, TruthIsInTheFirstLidarFrame) {
   const ScratchFolder folder;
   KittiSequenceWriter writer(folder.path());

@@ -109,6 +109,16 @@ TEST(Bag, ReadsLabelsThatAReplaySent) {
   write_bag(folder / "bag", {serialized(wire::to_cloud(bag_scan(0), raw, "lidar"))});
   const DatasetFrame frame = open_sequence(folder / "bag").read(0);
   EXPECT_THAT(frame.scan.labels, testing::Each(SemanticClass::car));
+  EXPECT_EQ(frame.raw_labels, raw) << "moving ones are truth for evaluation";
+}
+
+TEST(Bag, ReadsLabelsOfTheKindThatItIsTold) {
+  const ScratchFolder folder;
+  const std::vector<std::uint32_t> raw(10, 17);
+  write_bag(folder / "bag", {serialized(wire::to_cloud(bag_scan(0), raw, "lidar"))});
+  EXPECT_TRUE(open_sequence(folder / "bag").label_census().look_like_classes());
+  const ScanDataset told = open_recording(folder / "bag", "", LabelKind::classes).dataset;
+  EXPECT_THAT(told.read(0).scan.labels, testing::Each(SemanticClass::terrain));
 }
 
 TEST(Bag, AMissingMetadataFileIsNoFault) {

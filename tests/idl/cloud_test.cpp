@@ -231,6 +231,23 @@ TEST(CloudToScan, LabelsOf8BitsAreNoSemanticKittiIds) {
   }
 }
 
+TEST(CloudToScan, TellsClassesThatAreReadAsIds) {
+  const auto classes = three_points_with<std::uint32_t>("label", FieldType::uint32, {1, 9, 17});
+  EXPECT_TRUE(to_scan(classes, {}).label_census.look_like_classes());
+  const CloudReadOptions told{.fields = {}, .labels_are_classes = true};
+  EXPECT_FALSE(to_scan(classes, told).label_census.look_like_classes());
+  const auto ids = three_points_with<std::uint32_t>("label", FieldType::uint32, {10, 33, 50});
+  EXPECT_FALSE(to_scan(ids, {}).label_census.look_like_classes());
+  EXPECT_EQ(to_scan(ids, {}).label_census.unknown(), 1U);
+}
+
+TEST(CloudToScan, KeepsRawLabelsWhereAskedTo) {
+  const auto ids = three_points_with<std::uint32_t>("label", FieldType::uint32, {252, 33, 65586});
+  EXPECT_THAT(to_scan(ids, {}).raw_labels, testing::IsEmpty());
+  const CloudReadOptions keeping{.fields = {}, .keeps_raw_labels = true};
+  EXPECT_THAT(to_scan(ids, keeping).raw_labels, ElementsAre(252U, 33U, 65586U));
+}
+
 TEST(CloudToScan, TakesLabelsInFloatsWhereTheyAreWholeNumbers) {
   constexpr float nan = std::numeric_limits<float>::quiet_NaN();
   const auto whole = three_points_with<float>("label", FieldType::float32, {40.0F, nan, 252.0F});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "clients/commands/dataset/recording.hpp"
 #include "config/loaders/model_file.hpp"
 #include "config/loaders/sensor_file.hpp"
 #include "config/loaders/server_config.hpp"
@@ -133,6 +134,7 @@ LabelsConfig labels_config(const MapperArguments& arguments, const ScanDataset& 
   } else if (labels.source == LabelProvider::automatic) {
     labels.source = dataset.has_labels() ? LabelProvider::stream : LabelProvider::model;
   }
+  if (labels.source == LabelProvider::stream) require_semantic_kitti_labels(dataset);
   if (arguments.columns > 0) labels.image_columns = static_cast<int>(arguments.columns);
   set_engine(arguments.engine, labels.engine);
   return labels;

@@ -20,7 +20,7 @@ constexpr std::string_view topic_prefix = "topic:";
 
 struct DatasetExportArguments {
   std::string source;
-  std::string topic_in;
+  RecordingArguments recording;
   std::string out;
   MapperArguments mapper;
   ScanRange range;
@@ -64,7 +64,10 @@ std::string describe(const DatasetExportArguments& arguments, const ExportSummar
 }
 
 ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopSignal& stop) {
-  const ScanDataset dataset = open_recording(arguments.source, arguments.topic_in);
+  const ScanDataset dataset =
+      open_recording(arguments.source, arguments.recording, arguments.mapper.config_file);
+  // They are copied, whatever --labels says.
+  require_semantic_kitti_labels(dataset);
   std::error_code ignored;
   if (std::filesystem::equivalent(arguments.source, arguments.out, ignored)) {
     throw std::invalid_argument(arguments.out + " is the source itself; name another folder");
@@ -139,7 +142,7 @@ void add_dataset_export_command(CommandHandle dataset, Action& action) {
               "(folder, .db3 or .mcap), or topic:NAME of a sensor that a running stillmap-server "
               "listens to")
       .required();
-  command.option("--topic-in", arguments->topic_in, topic_in_help);
+  add_recording_options(command, arguments->recording);
   command.option("OUT", arguments->out, "New folder for the sequence").required();
   add_mapper_options(command, arguments->mapper);
   command.option("--start", arguments->range.first, "Number of the first scan");

@@ -1,15 +1,80 @@
 #include "clients/commands/dataset/recording.hpp"
 
 #include <iostream>
+#include <stdexcept>
 
+#include "clients/commands/command.hpp"
+#include "config/loaders/server_config.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 
 namespace stillmap::cli {
+namespace {
 
-ScanDataset open_recording(const std::string& path, const std::string& topic) {
-  dds::Recording recording = dds::open_recording(path, topic);
+ScanDataset opened(const std::string& path, const std::string& topic,
+                   std::optional<LabelKind> label_kind) {
+  dds::Recording recording = dds::open_recording(path, topic, label_kind);
   for (const std::string& fault : recording.faults) std::cerr << "stillmap: " << fault << "\n";
   return std::move(recording.dataset);
+}
+
+/// Nothing where nobody says classes: SemanticKITTI's are the default of the configuration.
+std::optional<LabelKind> label_kind_of(const RecordingArguments& recording,
+                                       const std::string& config_file) {
+  if (recording.label_kind == "classes") return LabelKind::classes;
+  if (!recording.label_kind.empty()) return LabelKind::semantic_kitti;
+  if (config_file.empty()) return std::nullopt;
+  const LabelKind configured = load_server_config(config_file).input.label_kind;
+  return configured == LabelKind::classes ? std::optional(configured) : std::nullopt;
+}
+
+/// What is wrong with the labels, and the ways out; else empty.
+std::string doubt_of_label_kind(const ScanDataset& dataset) {
+  const LabelCensus& census = dataset.label_census();
+  if (!census.look_like_classes()) return {};
+  return "the labels of " + dataset.file(0).string() +
+         " and others would be read as SemanticKITTI ids and look like classes 0 to 19: none is "
+         "beyond 19, and " +
+         std::to_string(census.unknown()) + " of " + std::to_string(census.labels()) +
+         " are no ids of SemanticKITTI. --label-kind classes reads them as such, --label-kind "
+         "semantic_kitti as they are; 'stillmap dataset export IN OUT --label-kind classes' "
+         "writes a sequence with ids for commands without that option";
+}
+
+}  // namespace
+
+void add_recording_options(CommandHandle command, RecordingArguments& recording) {
+  command.option("--topic-in", recording.topic_in, topic_in_help);
+  command
+      .option("--label-kind", recording.label_kind,
+              "What the numbers in its labels are: semantic_kitti (original ids), classes (0 to "
+              "19); default: as in --config, else semantic_kitti if they look like it")
+      .one_of({"semantic_kitti", "classes"});
+}
+
+ScanDataset open_recording(const std::string& path, const std::string& topic) {
+  return opened(path, topic, std::nullopt);
+}
+
+ScanDataset open_recording(const std::string& path, const RecordingArguments& recording,
+                           const std::string& config_file) {
+  ScanDataset dataset = opened(path, recording.topic_in, label_kind_of(recording, config_file));
+  const LabelCensus& census = dataset.label_census();
+  if (census.unknown() > 0 && !census.look_like_classes()) {
+    std::cerr << "stillmap: " << census.unknown() << " of " << census.labels()
+              << " labels of some scans have ids that SemanticKITTI does not have: they count as "
+                 "unlabeled\n";
+  }
+  return dataset;
+}
+
+void require_semantic_kitti_labels(const ScanDataset& dataset) {
+  if (const std::string doubt = doubt_of_label_kind(dataset); !doubt.empty())
+    throw std::invalid_argument(doubt);
+}
+
+void warn_of_label_kind(const ScanDataset& dataset) {
+  const std::string doubt = doubt_of_label_kind(dataset);
+  if (!doubt.empty()) std::cerr << "stillmap: " << doubt << "\n";
 }
 
 }  // namespace stillmap::cli

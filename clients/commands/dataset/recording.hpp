@@ -1,13 +1,39 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
+#include "clients/terminal/command_line.hpp"
 #include "core/dataset/scan_dataset.hpp"
 
 namespace stillmap::cli {
 
+/// What a command line says of a recording besides its path.
+struct RecordingArguments {
+  /// Of a bag with several topics of scans.
+  std::string topic_in;
+  /// "semantic_kitti" or "classes"; empty: as configured, else as SemanticKITTI's after a look.
+  std::string label_kind;
+};
+
+/// Adds --topic-in and --label-kind.
+void add_recording_options(CommandHandle command, RecordingArguments& recording);
+
 /// A dataset or bag, as dds::open_sequence(); says on standard error what of it cannot be read.
 /// Throws DatasetError.
 [[nodiscard]] ScanDataset open_recording(const std::string& path, const std::string& topic);
+
+/// The same, with labels of the kind that the command line says, else of `input.label_kind` in
+/// `config_file`, where there is one; says how many labels are of no known id. Throws ConfigError,
+/// too.
+[[nodiscard]] ScanDataset open_recording(const std::string& path,
+                                         const RecordingArguments& recording,
+                                         const std::string& config_file = {});
+
+/// Throws std::invalid_argument, with the ways out, where labels are read as SemanticKITTI ids and
+/// look like classes.
+void require_semantic_kitti_labels(const ScanDataset& dataset);
+/// Says the same on standard error.
+void warn_of_label_kind(const ScanDataset& dataset);
 
 }  // namespace stillmap::cli

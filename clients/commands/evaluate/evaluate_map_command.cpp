@@ -5,6 +5,7 @@
 
 #include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/commands/dataset/recording.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
@@ -147,6 +148,7 @@ ExitCode run(const EvaluateMapArguments& arguments) {
     throw DatasetError(arguments.map, "does not exist; 'stillmap map' writes map files");
   }
   const ScanDataset dataset(arguments.truth);
+  require_semantic_kitti_labels(dataset);
   const SavedMap map = read_map_file(arguments.map);
   const evaluation::MapTruth truth =
       true_map(arguments, dataset, poses_for_truth(arguments, dataset, map));

@@ -7,6 +7,7 @@
 
 #include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/commands/dataset/recording.hpp"
 #include "clients/commands/evaluate/segmentation_report.hpp"
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/terminal/json.hpp"
@@ -126,6 +127,7 @@ void write_picture(const EvaluateSegmentationArguments& arguments, const ScanDat
 SequenceScore run_model(const EvaluateSegmentationArguments& arguments, std::size_t number) {
   const std::string& sequence = arguments.truth[number];
   const ScanDataset dataset(sequence);
+  require_semantic_kitti_labels(dataset);
   const std::size_t scans = arguments.range.end(dataset) - arguments.range.first;
   const std::unique_ptr<Segmenter> labels = make_segmenter(arguments.mapper, dataset);
   Progress progress("segment " + sequence, "scans", scans);

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "clients/commands/dataset/recording.hpp"
 #include "core/dataset/scan_dataset.hpp"
 #include "core/simulation/simulated_imu.hpp"
 #include "core/simulation/simulation.hpp"
@@ -92,6 +93,7 @@ GroundTruthSequence open_recorded(const std::string& name) {
   GroundTruthSequence sequence;
   sequence.name = name;
   sequence.sensor = dataset->suggested_sensor();
+  require_semantic_kitti_labels(*dataset);
   sequence.labelled = dataset->has_labels();
   sequence.imu = dataset->imu();
   sequence.read = [dataset](std::size_t i) { return dataset->read(i).scan; };

@@ -139,7 +139,6 @@ Trajectory PoseLog::poses_of(const std::vector<std::int64_t>& stamps_ns) const {
 }
 
 using Clock = ReplayClock::Clock;
-
 constexpr std::chrono::milliseconds publish_step{500};
 constexpr std::chrono::milliseconds imu_patience{1000};
 constexpr std::chrono::milliseconds status_period{100};
@@ -272,7 +271,7 @@ dds::ServerStatus wait_until_mapped(Client& client, const dds::ServerStatus& bef
 
 struct ReplayArguments {
   std::string dataset;
-  std::string topic_in;
+  RecordingArguments recording;
   ClientArguments client;
   ReplayOptions replay;
   /// 0: not given.
@@ -351,7 +350,8 @@ std::optional<FrameTransform> mount_of(const ReplayArguments& arguments) {
 }
 
 ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
-  const ScanDataset dataset = open_recording(arguments.dataset, arguments.topic_in);
+  const ScanDataset dataset = open_recording(arguments.dataset, arguments.recording);
+  if (arguments.replay.with_labels) warn_of_label_kind(dataset);
   (void)arguments.replay.range.end(dataset);
   if (dataset.kitti_lidar()) std::cerr << "stillmap: " << dataset.kitti_lidar()->in_words() << "\n";
   SensorFeeds feeds{SampleFeed(dataset.imu()), SampleFeed(dataset.gnss())};
@@ -448,7 +448,7 @@ void add_replay_command(CommandHandle program, Action& action) {
   CommandHandle command =
       program.command("replay", "Publish a sequence or bag on DDS, as a lidar driver would");
   command.option("DATASET", arguments->dataset, dataset_kinds).required();
-  command.option("--topic-in", arguments->topic_in, topic_in_help);
+  add_recording_options(command, arguments->recording);
   command
       .option("--rate", arguments->rate,
               "Times real time; default 1, with --lossless as fast as the server maps")

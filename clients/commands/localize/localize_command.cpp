@@ -13,6 +13,7 @@
 #include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/commands/dataset/recording.hpp"
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
@@ -22,7 +23,6 @@
 #include "core/localization/localizer.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/picture/map_picture.hpp"
-#include "idl/bag/bag_scan_source.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -36,7 +36,7 @@ double milliseconds_since(Clock::time_point start) {
 struct LocalizeArguments {
   std::string map;
   std::string dataset;
-  std::string topic_in;
+  RecordingArguments recording;
   MapperArguments mapper;
   MountArguments mount;
   ScanRange range;
@@ -224,7 +224,8 @@ void write_picture(const std::string& file, const std::vector<LocalizedScan>& sc
 ExitCode run(const LocalizeArguments& arguments) {
   StopSignal stop;
   const SearchableMap map = load_map(arguments.map);
-  const ScanDataset dataset = dds::open_sequence(arguments.dataset, arguments.topic_in);
+  const ScanDataset dataset =
+      open_recording(arguments.dataset, arguments.recording, arguments.mapper.config_file);
   const std::size_t end = arguments.range.end(dataset);
   const Localizer localizer(map.index);
   LocalizationRun run(dataset, arguments, localizer);
@@ -253,7 +254,7 @@ void add_localize_command(CommandHandle program, Action& action) {
       "localize", "Find scans in a map with no prior pose, each in the whole of it");
   command.option("MAP", arguments->map, "A map file; it is only read").required();
   command.option("DATASET", arguments->dataset, dataset_kinds).required();
-  command.option("--topic-in", arguments->topic_in, topic_in_help);
+  add_recording_options(command, arguments->recording);
   add_mapper_options(command, arguments->mapper);
   add_mount_option(
       command, arguments->mount,

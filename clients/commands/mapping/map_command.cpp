@@ -169,7 +169,7 @@ MapOutput write_map_output(const MapOutputFolder& out, const std::optional<Traje
 
 struct MapArguments {
   std::string dataset;
-  std::string topic_in;
+  RecordingArguments recording;
   std::string out = "stillmap_out";
   MapperArguments mapper;
   MountArguments mount;
@@ -300,6 +300,8 @@ RunIdentity run_identity(const MapArguments& arguments, const ScanDataset& datas
            << q.coeffs().transpose() << (arguments.loops == "on" ? ", loops closed" : "")
            << (arguments.gnss == "on" ? "" : ", without GNSS")
            << (earlier == nullptr ? "" : ", onto " + earlier->identity());
+  const std::string& label_kind = arguments.recording.label_kind;
+  if (!label_kind.empty()) settings << ", label kind " << label_kind;
   for (const double metres : arguments.antenna) settings << ", antenna " << metres;
   for (const std::string& denied : arguments.denied_loops) settings << ", not " << denied;
   if (!arguments.mapper.config_file.empty())
@@ -365,7 +367,8 @@ ExitCode stopped_early(const MapOutputFolder& out, const std::string& what_is_th
 
 ExitCode run(const MapArguments& arguments) {
   StopSignal stop;
-  const ScanDataset dataset = open_recording(arguments.dataset, arguments.topic_in);
+  const ScanDataset dataset =
+      open_recording(arguments.dataset, arguments.recording, arguments.mapper.config_file);
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
   const MappedBody body = body_of(arguments.mount, arguments.mapper.config_file);
   static_cast<void>(arguments.range.end(dataset));
@@ -434,7 +437,7 @@ void add_map_command(CommandHandle program, Action& action) {
   CommandHandle command = program.command(
       "map", "Map a sequence or bag in this process: the server's mapper without DDS");
   command.option("DATASET", arguments->dataset, dataset_kinds).required();
-  command.option("--topic-in", arguments->topic_in, topic_in_help);
+  add_recording_options(command, arguments->recording);
   command.option("--out", arguments->out, "Folder for the results").with_default();
   add_mapper_options(command, arguments->mapper);
   add_mount_option(command, arguments->mount,
