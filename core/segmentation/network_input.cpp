@@ -11,12 +11,22 @@
 namespace stillmap {
 namespace {
 
-/// The factor that brings a scan's intensity to the scale of the training set: 1 where its bright
-/// points are about as bright. 0 where all points are alike, as where a driver fills the field with
-/// zeros: it tells nothing.
+/// The part of `factor`, which would bring a scan to the usual brightness, that is applied: nothing
+/// of one that scans of the training set's own lidar may need, all of one that only another scale
+/// needs, and between them the more the greater it is. A lidar may lie anywhere between them, and
+/// from scan to scan on either side of any step.
+float applied_part(float factor) {
+  constexpr float usual_factor = 1.2F, other_scale_factor = 3.0F;
+  const float share = std::log(std::max(factor, 1.0F / factor) / usual_factor) /
+                      std::log(other_scale_factor / usual_factor);
+  return std::pow(factor, std::clamp(share, 0.0F, 1.0F));
+}
+
+/// The factor that brings a scan's intensity towards the scale of the training set: 1 where its
+/// bright points are about as bright. 0 where all points are alike, as where a driver fills the
+/// field with zeros: it tells nothing.
 float remission_factor(std::span<const float> intensity, const InputStatistics& statistics) {
   constexpr std::size_t samples = 4096, min_points = 1000;
-  constexpr float usual_factor = 3.0F;
   if (intensity.size() < min_points) return 1.0F;
   std::vector<float> sample;
   const std::size_t step = intensity.size() / samples + 1;
@@ -34,8 +44,7 @@ float remission_factor(std::span<const float> intensity, const InputStatistics& 
   // The same share of a normal distribution.
   constexpr std::size_t remission = index(InputChannel::remission);
   const float usual = statistics.mean[remission] + 1.28F * statistics.deviation[remission];
-  const bool is_usual = bright < usual * usual_factor && bright > usual / usual_factor;
-  return is_usual || usual <= 0.0F ? 1.0F : usual / bright;
+  return usual > 0.0F ? applied_part(usual / bright) : 1.0F;
 }
 
 /// Scans of the usual scale have no more.

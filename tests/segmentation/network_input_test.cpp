@@ -96,7 +96,6 @@ TEST(NetworkInput, TakesTheMeanRemissionWhenThereIsNone) {
 TEST(NetworkInput, IntensityOfAnotherScaleIsBroughtToTheModels) {
   const Scan scan = random_scan(3000, 2);
   const RangeImage image = project(scan, model);
-  const std::vector<float> plain = make_network_input(scan, image, model);
   const auto scaled = [&](float factor) {
     Scan other = scan;
     for (float& intensity : other.intensity) intensity *= factor;
@@ -112,10 +111,31 @@ TEST(NetworkInput, IntensityOfAnotherScaleIsBroughtToTheModels) {
   EXPECT_LT(change, 10.0F);
   // Of about the model's own scale it stays as it is.
   const float mean = model.statistics.mean[4], deviation = model.statistics.deviation[4];
-  const std::vector<float> darker = scaled(0.7F);
+  const float usual = (mean + 1.28F * deviation) / 0.9F;
+  const std::vector<float> plain = scaled(usual), darker = scaled(0.9F * usual);
   for (std::size_t i = 4 * pixels; i < 5 * pixels; ++i) {
     if (plain[i] == 0.0F) continue;
-    EXPECT_NEAR(darker[i] * deviation + mean, 0.7F * (plain[i] * deviation + mean), 1e-4F);
+    EXPECT_NEAR(darker[i] * deviation + mean, 0.9F * (plain[i] * deviation + mean), 1e-4F);
+  }
+}
+
+TEST(NetworkInput, ALittleMoreIntensityChangesTheInputALittle) {
+  Scan scan = random_scan(3000, 2);
+  const RangeImage image = project(scan, model);
+  const float mean = model.statistics.mean[4], deviation = model.statistics.deviation[4];
+  const auto seen = static_cast<std::size_t>(image.pixel_of_point()[0]);
+  const auto nearest = static_cast<std::size_t>(image.nearest()[seen]);
+  scan.intensity[nearest] = 0.2F;
+  const auto remission = [&] {
+    return make_network_input(scan, image, model)[4 * pixels + seen] * deviation + mean;
+  };
+  for (float& intensity : scan.intensity) intensity *= 0.02F;
+  float last = remission();
+  for (int step = 0; step < 200; ++step) {
+    for (float& intensity : scan.intensity) intensity *= 1.02F;
+    const float now = remission();
+    EXPECT_NEAR(now / last, 1.0F, 0.06F) << "step " << step;
+    last = now;
   }
 }
 
