@@ -54,6 +54,32 @@ class Import(Folder):
         self.assertEqual(run_import(self.source, self.model).returncode, 0)
 
 
+class Program(Folder):
+    def refusal(self, program, folder=None):
+        command = [sys.executable, SCRIPT, self.source, self.model, "--stillmap", program]
+        result = subprocess.run([*map(str, command)], capture_output=True, text=True, cwd=folder)
+        self.assertNotIn("Traceback", result.stderr)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("--no-check", result.stderr)
+        return result.stderr
+
+    def test_that_is_not_there_is_named_before_anything_is_written(self):
+        self.assertIn("no such program", self.refusal("no/such/stillmap"))
+        self.assertIn("no such program", self.refusal("no_such_stillmap"))
+        self.assertFalse(self.model.exists())
+
+    def test_that_is_no_program_or_fails_is_named(self):
+        random_bonnetal(self.source, 21, new_format=True)
+        text = self.source.parent / "stillmap"
+        text.write_text("no program")
+        self.assertIn("cannot be started", self.refusal(text))
+        text.write_text("#!/bin/sh\nexit 3\n")
+        text.chmod(0o755)
+        # As a user says who stands beside it.
+        self.assertIn("'stillmap model run' failed with 3", self.refusal("./stillmap", text.parent))
+        self.assertTrue((self.model / "model.yaml").exists())
+
+
 class Runs:
     """Pickles to a call: what a hostile checkpoint does."""
 

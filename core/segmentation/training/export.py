@@ -7,13 +7,21 @@ The program `stillmap` calibrates int8.yaml and runs the engines that are compar
 """
 
 import argparse
-import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
 import torch
 
-from model_folder import check_engines, class_names, describe, random_images, write_model
+from model_folder import (
+    ProgramFault,
+    check_engines,
+    class_names,
+    describe,
+    random_images,
+    run_stillmap,
+    write_model,
+)
 from networks import make_network
 
 
@@ -85,15 +93,13 @@ def read_arguments():
     return arguments
 
 
-def main():
-    arguments = read_arguments()
-    network, state = load_run(arguments.run, "last.pt" if arguments.last else "best.pt")
-    description = describe_run(arguments, state)
-    write_model(arguments.folder, network, description)
+def calibrate_and_compare(arguments, network, description):
+    """Makes int8.yaml where sequences are given, and prints how engines and PyTorch agree."""
     engines = [("opencv", "fp32"), ("onednn", "fp32")]
     if arguments.calibrate:
-        command = [arguments.stillmap, "model", "calibrate", arguments.folder]
-        subprocess.run([*map(str, command), *arguments.calibrate], check=True)
+        run_stillmap(
+            arguments.stillmap, "model", "calibrate", arguments.folder, *arguments.calibrate
+        )
         engines.append(("onednn", "int8"))
     image = description["image"]
     shape = len(description["statistics"]), image["rows"], image["columns"]
@@ -102,6 +108,17 @@ def main():
         check_engines(
             arguments.stillmap, arguments.folder, network, images, Path(scratch), engines
         )
+
+
+def main():
+    arguments = read_arguments()
+    network, state = load_run(arguments.run, "last.pt" if arguments.last else "best.pt")
+    description = describe_run(arguments, state)
+    write_model(arguments.folder, network, description)
+    try:
+        calibrate_and_compare(arguments, network, description)
+    except ProgramFault as fault:
+        sys.exit(f"export: {fault}. {arguments.folder} is there, not compared with PyTorch")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@
 
 The folder holds arch_cfg.yaml, data_cfg.yaml, backbone, segmentation_decoder and segmentation_head,
 in PyTorch's old format or the new one. The same input then goes through PyTorch and Stillmap's
-engines; exit code 1 if they do not agree. Weights that were trained on SemanticKITTI keep its
+engines; exit code 1 if they do not agree, 2 if they cannot be compared. Weights that were trained on SemanticKITTI keep its
 licence, CC BY-NC-SA: not for commercial use.
 """
 
@@ -17,7 +17,14 @@ from pathlib import Path
 import torch
 import yaml
 
-from model_folder import check_engines, describe, random_images, write_model
+from model_folder import (
+    ProgramFault,
+    check_engines,
+    describe,
+    find_program,
+    random_images,
+    write_model,
+)
 from networks import RangeNet
 from scans import CLASS_NAMES, CLASS_OF_ID
 
@@ -160,28 +167,45 @@ def agree(results):
     return all(d <= MAX_DIFFERENCE and a >= MIN_AGREEMENT for _, _, d, a in results)
 
 
+def compare_engines(arguments, network, description):
+    """What check_engines() gives for the engines of full precision."""
+    images = random_images(1, (5, description["image"]["rows"], description["image"]["columns"]))
+    engines = [("opencv", "fp32"), ("onednn", "fp32")]
+    with tempfile.TemporaryDirectory() as scratch:
+        return check_engines(
+            arguments.stillmap, arguments.folder, network, images, Path(scratch), engines
+        )
+
+
+def end_without_comparison(fault, what_is_there):
+    print(
+        f"import_rangenet: the engines cannot be compared with PyTorch: {fault}. {what_is_there}; "
+        "--no-check leaves the comparison out",
+        file=sys.stderr,
+    )
+    sys.exit(2)
+
+
 def main():
     arguments = read_arguments()
     torch.set_num_threads(torch.multiprocessing.cpu_count())
     try:
+        if not arguments.no_check:
+            find_program(arguments.stillmap)
         network, arch, layers = read_network(arguments.source)
         description = describe_folder(arguments.source, arch, layers, arguments)
         write_model(arguments.folder, network, description)
     except ImportFault as fault:
         sys.exit(f"import_rangenet: {fault}")
+    except ProgramFault as fault:
+        end_without_comparison(fault, "Nothing was written")
     print(f"{arguments.folder}: model.onnx and model.yaml written")
     if arguments.no_check:
         return
-    images = random_images(1, (5, description["image"]["rows"], description["image"]["columns"]))
-    with tempfile.TemporaryDirectory() as scratch:
-        results = check_engines(
-            arguments.stillmap,
-            arguments.folder,
-            network,
-            images,
-            Path(scratch),
-            [("opencv", "fp32"), ("onednn", "fp32")],
-        )
+    try:
+        results = compare_engines(arguments, network, description)
+    except ProgramFault as fault:
+        end_without_comparison(fault, f"{arguments.folder} is there, unproven")
     if not agree(results):
         sys.exit("import_rangenet: the engines do not agree with PyTorch; do not use this model")
 

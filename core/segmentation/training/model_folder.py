@@ -1,5 +1,6 @@
 """Model folders: model.onnx and the model.yaml that describes it, as config/loaders reads them."""
 
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -59,12 +60,40 @@ def write_model(folder, network, description):
     (folder / "model.yaml").write_text(text)
 
 
+class ProgramFault(Exception):
+    """The program `stillmap` cannot be started, or failed."""
+
+
+def find_program(name):
+    """Where the program is: a path, also one without a folder (as `./stillmap` becomes), else a name
+    in PATH."""
+    path = Path(name)
+    if path.is_file():
+        return path.resolve()
+    found = shutil.which(str(name)) if path.parent == Path() else None
+    if not found:
+        raise ProgramFault(f"{name}: no such program; --stillmap names it")
+    return Path(found)
+
+
+def run_stillmap(stillmap, *arguments):
+    """Runs it; what it prints is seen. Raises ProgramFault where that fails."""
+    command = [str(find_program(stillmap)), *map(str, arguments)]
+    try:
+        subprocess.run(command, check=True)
+    except OSError as fault:
+        raise ProgramFault(f"{command[0]} cannot be started: {fault.strerror}") from fault
+    except subprocess.CalledProcessError as fault:
+        words = " ".join(command[1:3])
+        raise ProgramFault(f"'stillmap {words}' failed with {fault.returncode}") from fault
+
+
 def run_engine(stillmap, folder, images, engine, precision, scratch):
     """Probabilities (n x classes x rows x columns) of `images` by one of Stillmap's engines."""
     inputs, outputs = scratch / "input.f32", scratch / f"{engine}_{precision}.f32"
     images.astype("<f4").tofile(inputs)
-    command = [stillmap, "model", "run", folder, "--engine", engine, "--precision", precision]
-    subprocess.run([*map(str, command), "--input", inputs, "--output", outputs], check=True)
+    choice = ["--engine", engine, "--precision", precision]
+    run_stillmap(stillmap, "model", "run", folder, *choice, "--input", inputs, "--output", outputs)
     n, _, rows, columns = images.shape
     return np.fromfile(outputs, "<f4").reshape(n, -1, rows, columns)
 
