@@ -15,8 +15,9 @@ namespace stillmap {
 
 /// Files and folders beside one another that are read as one sequence.
 inline constexpr std::array sequence_parts{
-    "velodyne",  "labels",    "labels.bak",      "rings",   "time_offsets", "calib.txt",
-    "times.txt", "poses.txt", "poses_lidar.txt", "imu.csv", "imu.txt",      "gnss.csv"};
+    "velodyne",  "labels",    "labels.bak", "rings",           "time_offsets",
+    "calib.txt", "times.txt", "poses.txt",  "poses_lidar.txt", "imu.csv",
+    "imu.txt",   "gnss.csv",  "sensor.yaml"};
 
 /// The first of them that the folder holds; empty where it holds none.
 [[nodiscard]] std::filesystem::path part_of_sequence_in(const std::filesystem::path& folder);

@@ -3,6 +3,7 @@
 #include <sstream>
 #include <vector>
 
+#include "config/loaders/sensor_file.hpp"
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/scan_dataset.hpp"
 #include "tests/clients/command_test.hpp"
@@ -166,6 +167,16 @@ TEST_F(DatasetCommandTest, DoesNotWriteOverAnythingUnlessForced) {
   ASSERT_EQ(run(to_cloud).exit_code, 0);
   EXPECT_EQ(run(to_cloud).exit_code, 2);
   EXPECT_EQ(run(to_cloud + " --force").exit_code, 0);
+}
+
+TEST_F(DatasetCommandTest, SaysOfWhichLidarASequenceIs) {
+  simulate("city", 2);
+  EXPECT_EQ(load_sensor(path("city/sensor.yaml")).name, "VLP-16");
+  const std::string to_copy = "dataset export " + path("city") + " " + path("copy");
+  ASSERT_EQ(run(to_copy).exit_code, 0);
+  EXPECT_EQ(load_sensor(path("copy/sensor.yaml")).rings, 16);
+  ASSERT_EQ(run(to_copy + " --sensor hdl_32e --force").exit_code, 0);
+  EXPECT_EQ(load_sensor(path("copy/sensor.yaml")).name, "HDL-32E");
 }
 
 TEST_F(DatasetCommandTest, RefusesClassesThatWouldBeReadAsIdsUntilItIsToldWhatTheyAre) {

@@ -2,6 +2,7 @@
 
 import math
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -314,6 +315,23 @@ class Training(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         return result.stdout
 
+    def test_refuses_scans_of_another_lidar_than_the_configurations(self):
+        copy = self.root / "copy"
+        shutil.copytree(self.data, copy)
+        (copy / "sequences" / "00" / "sensor.yaml").unlink()
+        scans = ScanFiles([copy], [], ImageModel(64, 256, 3, -25))
+        with self.assertRaisesRegex(ValueError, "no sensor.yaml.* 3[0-9]% of the points"):
+            scans.require_field_of_view()
+        ScanFiles([copy], [], ImageModel(16, 256, 15.5, -15.5)).require_field_of_view()
+        ScanFiles([self.data], [], ImageModel(64, 256, 3, -25)).require_field_of_view()
+        command = [sys.executable, TRAINING / "train.py", TRAINING / "training.yaml"]
+        command += [self.root / "refused", "--set", f"data.train=[{copy}]"]
+        command += ["--set", f"data.validation=[{copy}]"]
+        result = subprocess.run([*map(str, command)], capture_output=True, text=True)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("stillmap dataset sensor", result.stderr)
+        self.assertNotIn("Traceback", result.stderr)
+
     def test_learns_resumes_and_exports(self):
         self.train(2)
         output = self.train(6)
@@ -335,10 +353,10 @@ class Training(unittest.TestCase):
         self.assertIn("onednn   int8", result.stdout)
         self.assertTrue((self.root / "model" / "int8.yaml").exists())
         description = yaml.safe_load((self.root / "model" / "model.yaml").read_text())
-        # The sequence has no sensor.yaml, and so the rows and the field of view of the configuration.
+        # As sensor.yaml of the sequence says, not as the configuration.
         self.assertEqual(
             description["trained_for"],
-            {"min_beams": 64, "max_beams": 64, "fov_up_deg": 3, "fov_down_deg": -25},
+            {"min_beams": 16, "max_beams": 16, "fov_up_deg": 16, "fov_down_deg": -16},
         )
         self.assertEqual(description["voxel_votes"]["use"], True)
         self.assertEqual(description["voxel_votes"]["height_m"], 0.1)

@@ -1,5 +1,7 @@
+#include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -11,6 +13,7 @@
 #include "clients/commands/dataset/sequence_export.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
+#include "config/loaders/sensor_file.hpp"
 #include "config/loaders/topic_name.hpp"
 
 namespace stillmap::cli {
@@ -63,6 +66,13 @@ std::string describe(const DatasetExportArguments& arguments, const ExportSummar
   return text;
 }
 
+/// For training, which reads rows and field of view there: the lidar that was named, else the one
+/// that the written scans show.
+void write_sensor(const std::string& folder, const std::optional<SensorModel>& named) {
+  save_sensor(named ? *named : ScanDataset(folder).suggested_sensor(),
+              std::filesystem::path(folder) / "sensor.yaml");
+}
+
 ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopSignal& stop) {
   const ScanDataset dataset =
       open_recording(arguments.source, arguments.recording, arguments.mapper.config_file);
@@ -81,13 +91,15 @@ ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopS
   static_cast<void>(dataset.gnss());
   prepare_sequence_folder(arguments.out, arguments.force, arguments.source);
   Progress progress("export", "scans", total);
-  return export_sequence(
+  ExportSummary summary = export_sequence(
       dataset, arguments.range, config, std::move(labels), arguments.out,
       [&](std::size_t seen) {
         progress.update(seen);
         return !stop.requested();
       },
       [&](const SkippedScan& scan) { progress.say("stillmap: " + scan.reason); });
+  write_sensor(arguments.out, config.sensor);
+  return summary;
 }
 
 ExportSummary export_from_topic(const DatasetExportArguments& arguments, StopSignal& stop) {
@@ -99,6 +111,8 @@ ExportSummary export_from_topic(const DatasetExportArguments& arguments, StopSig
   if (!arguments.mapper.config_file.empty()) {
     config = load_server_config(arguments.mapper.config_file);
   }
+  const bool names_sensor =
+      !arguments.mapper.sensor.empty() || (!config.automatic_sensor.is_on && config.lidars.empty());
   config.mapper = mapper_config(arguments.mapper, config.mapper.sensor);
   Client client = connect(arguments.client);
   prepare_sequence_folder(arguments.out, arguments.force);
@@ -112,6 +126,8 @@ ExportSummary export_from_topic(const DatasetExportArguments& arguments, StopSig
   progress.say("stillmap: waiting for scans on '" + options.topic + "'; Ctrl-C ends the sequence");
   ExportSummary summary = export_live(client, options, config, arguments.out, stop,
                                       [&](std::size_t scans) { progress.update(scans); });
+  if (summary.scans > 0)
+    write_sensor(arguments.out, names_sensor ? std::optional(config.mapper.sensor) : std::nullopt);
   summary.label_source = client.status().label_source;
   summary.stopped = known_end && summary.scans < options.scans;
   return summary;
@@ -172,7 +188,8 @@ void add_dataset_export_command(CommandHandle dataset, Action& action) {
       "topic).\n"
       "Ctrl-C leaves a shorter sequence that is complete in itself; a new run starts over, as "
       "poses\n"
-      "follow from all scans before. Live, give the server's own file with --config.");
+      "follow from all scans before. sensor.yaml is the lidar, for training. Live, give the "
+      "server's own file with --config.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

@@ -7,6 +7,7 @@
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
+#include "config/loaders/sensor_file.hpp"
 #include "core/dataset/gnss_file.hpp"
 #include "core/dataset/imu_file.hpp"
 #include "core/dataset/kitti_files.hpp"
@@ -38,6 +39,7 @@ Written write_sequence(const SimulateArguments& arguments, const simulation::Sim
   // Before the scans, so that they are there however the run ends.
   const Eigen::Isometry3d T_city_first = simulation.T_map_lidar_at(0.0);
   write_poses(folder / "first_pose_city.txt", {&T_city_first, 1});
+  save_sensor(simulation.config().sensor, folder / "sensor.yaml");
   if (arguments.imu) write_imu_csv(folder / "imu.csv", simulated_imu(simulation));
   if (arguments.gnss_m > 0.0) {
     write_gnss_csv(folder / "gnss.csv", simulated_gnss(simulation, {.wander_m = arguments.gnss_m}));
@@ -135,7 +137,7 @@ void add_simulate_command(CommandHandle program, Action& action) {
       "  stillmap simulate avenue --preset crowd --seed 7 --sensor vlp_16\n"
       "  stillmap simulate empty --traffic 0 --scans 50 --rolling\n"
       "poses.txt begins at the first scan, as KITTI's do; first_pose_city.txt has the pose of its\n"
-      "lidar in the city, in which all days are.\n"
+      "lidar in the city, in which all days are. sensor.yaml is the lidar, for training.\n"
       "The same options give the same files, bit by bit.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }

@@ -5,9 +5,13 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from range_images import ImageModel
+from range_images import ImageModel, elevation_rad
 
 IGNORED = 0
+
+# More of a scan's points beyond the rows of its image, where they crowd into the first and the last
+# one: another lidar's. KITTI's has about 1 % there.
+MOST_OUTSIDE = 0.1
 
 # learning_map of the single-scan task: original id to network class.
 CLASS_OF_ID = {
@@ -52,6 +56,13 @@ def sensor_image(sequence, default):
     )
 
 
+def share_outside(points, image):
+    """Share of the points (n x 3) above or below the image's field of view."""
+    elevation_deg = np.degrees(elevation_rad(points.astype(np.float64)))
+    outside = (elevation_deg > image.fov_up_deg) | (elevation_deg < image.fov_down_deg)
+    return float(outside.mean()) if len(points) else 0.0
+
+
 class ScanFiles:
     """The labelled scans of one or more SemanticKITTI folders."""
 
@@ -92,6 +103,26 @@ class ScanFiles:
         scan = scan[usable]
         labels = labels[usable]
         return scan[:, :3], scan[:, 3], classes_of(labels), labels >> 16
+
+    def require_field_of_view(self):
+        """Raises ValueError where sequences without a sensor.yaml are not of the lidar that the
+        configuration's `image` describes, by the first scan of each."""
+        looked_at = set()
+        for index, (scan, _) in enumerate(self.files):
+            sequence = scan.parent.parent
+            if sequence in looked_at or (sequence / "sensor.yaml").exists():
+                continue
+            looked_at.add(sequence)
+            image = self.images[index]
+            share = share_outside(self.read(index)[0], image)
+            if share > MOST_OUTSIDE:
+                raise ValueError(
+                    f"{sequence} has no sensor.yaml, and {share:.0%} of the points of {scan.name} lie "
+                    f"outside {image.fov_up_deg:+g} to {image.fov_down_deg:+g} degrees, the field of "
+                    f"view of 'image' in the configuration: write it with 'stillmap dataset sensor "
+                    f"{sequence} --out {sequence}/sensor.yaml', or set image.rows, image.fov_up_deg "
+                    f"and image.fov_down_deg"
+                )
 
     def evenly_chosen(self, most):
         """Indices of at most about `most` scans, as many of each folder as there are."""

@@ -75,6 +75,11 @@ class Run:
         self.config, self.folder, self.device = config, folder, device
         self.scans = open_scans(config, "train")
         self.validation = open_scans(config, "validation")
+        try:
+            self.scans.require_field_of_view()
+            self.validation.require_field_of_view()
+        except ValueError as error:
+            raise SystemExit(str(error)) from None
         settings = config["optimiser"]
         draws = config["data"].get("train_draws")
         if draws and len(draws) != len(config["data"]["train"]):
