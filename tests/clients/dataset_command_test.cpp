@@ -251,6 +251,7 @@ TEST_F(DatasetCommandTest, ALiveTopicBecomesASequence) {
               content("city/labels/" + stem(number) + ".label").size());
   }
   EXPECT_EQ(line_count("live/poses.txt"), live_times.size());
+  EXPECT_EQ(load_sensor(path("live/sensor.yaml")).rings, 16) << "told by the scans alone";
   // The labels of the stream return as those of the server.
   const std::string log = content("export.log");
   EXPECT_GT(nlohmann::json::parse(log.substr(log.find("\n{"))).at("labelled_points"), 10'000);
