@@ -46,6 +46,10 @@ export class MapTiles {
       if (info.identity.map_id !== this.mapId) this.#listSoon();
       else this.#entry(info);
     });
+    // The index has no entry of a map without tiles.
+    connection.listen(`${prefix}/status`, (status) => {
+      if (this.mapId !== undefined && status.map_id !== this.mapId) this.#listSoon();
+    });
   }
 
   #tell(fault) {

@@ -202,4 +202,12 @@ describe("page", () => {
   });
 
   it("has no problems of its own", () => { assert.deepEqual(problems, []); });
+
+  it("drops the map of a server that began another one, without a tile", async () => {
+    await whole();
+    stack.server.kill("SIGKILL");
+    await stack.server.ended;
+    stack.startServer("--delivery", "every");
+    await eventually("an empty map", () => evaluate(() => window.stillmap.tiles.tiles.size === 0));
+  });
 });
