@@ -11,8 +11,9 @@ namespace stillmap {
 /// How the ring of a point is found when the scan does not carry it.
 enum class RingSource { field, order, elevation };
 
-/// How a lidar's points lie: on rings that beams turn along, or anywhere (Livox, merged clouds).
-enum class ScanPattern { rings, irregular };
+/// How a lidar's points lie: on rings that beams turn along, anywhere (Livox), or as those of
+/// several lidars that make one scan.
+enum class ScanPattern { rings, irregular, merged };
 
 /// What carries the lidar never exceeds. Poses beyond these are not believed; the defaults are
 /// beyond any vehicle or hand.

@@ -85,7 +85,7 @@ SensorModel merged_sensor(std::span<const PlacedSensor> sensors) {
   merged.name.clear();
   merged.rings = 0;
   merged.beam_elevations.clear();
-  merged.pattern = ScanPattern::irregular;
+  merged.pattern = ScanPattern::merged;
   merged.ring_source = RingSource::elevation;
   merged.intensity_scale = 1.0F;
   merged.elevation_offset = 0.0;

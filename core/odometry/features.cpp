@@ -235,14 +235,14 @@ void pick_points(const Scan& scan, std::vector<std::uint32_t> spaced, Features& 
 }  // namespace
 
 bool is_registered_by_surfaces(const SensorModel& sensor, const OdometryConfig& config) {
-  if (sensor.pattern == ScanPattern::irregular) return true;
+  if (sensor.pattern != ScanPattern::rings) return true;
   return !config.paper_exact && sensor.rings >= config.features.min_surface_rings;
 }
 
 bool has_sparse_rings(const SensorModel& sensor) {
   // Of 16 rings over 30 degrees, not of 32 over 41.
   constexpr double min_spacing_rad = 1.5 * std::numbers::pi / 180.0;
-  return sensor.pattern != ScanPattern::irregular &&
+  return sensor.pattern == ScanPattern::rings &&
          sensor.fov_up - sensor.fov_down >= min_spacing_rad * sensor.rings;
 }
 

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <sstream>
 #include <string_view>
+#include <vector>
 
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/segmentation_network.hpp"
@@ -18,6 +19,8 @@ constexpr int max_rows = 512;
 /// images.
 constexpr int few_beams = 16;
 constexpr int columns_of_few_beams = 1536;
+/// Networks that halve an image's rows take multiples of that: street those of 4.
+constexpr int row_multiple = 8;
 
 std::string statistics_faults(const InputStatistics& statistics) {
   std::string faults;
@@ -46,6 +49,35 @@ double misfit(const ModelDescription& model, const SensorModel& sensor) {
   return beams + beyond / (sensor.fov_up - sensor.fov_down) + std::max(0.0, columns);
 }
 
+/// Beams that evenly spaced ones would be if they lay as close as most of the sensor's do: of an
+/// uneven sensor more than it has, but not more than the model's own images have rows.
+double beams_by_step(const SensorModel& sensor, int usual_rows) {
+  const std::vector<double>& beams = sensor.beam_elevations;
+  if (beams.size() < 2) return sensor.rings;
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < beams.size(); ++i) steps.push_back(beams[i - 1] - beams[i]);
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::ranges::nth_element(steps, middle);
+  const double close = (sensor.fov_up - sensor.fov_down) / *middle;
+  return std::max<double>(sensor.rings, std::min<double>(close, usual_rows));
+}
+
+/// Half way between the sensor's beams and the rows of the model's own images, which its filters
+/// fit: in fewer rows everything is lower than in those, and more of them stay empty in more. At
+/// most every second one does, as between the beams of an HDL-64E, and no image has more than twice
+/// the model's. The beams of several lidars share a wider field of view, and lie between each other
+/// somewhere. Bands have no empty rows between them that others would fill.
+int image_rows(const SensorModel& sensor, int usual_rows) {
+  double rows = sensor.rings;
+  if (sensor.pattern != ScanPattern::irregular) {
+    rows = 0.5 * (beams_by_step(sensor, usual_rows) + usual_rows);
+    if (sensor.pattern == ScanPattern::merged) rows = std::max<double>(rows, usual_rows);
+    rows = std::min(rows, 2.0 * sensor.rings);
+  }
+  rows = std::min(rows, 2.0 * usual_rows);
+  return std::max(1, static_cast<int>(std::lround(rows / row_multiple))) * row_multiple;
+}
+
 /// Angle for people.
 std::string degrees(double radians) {
   std::ostringstream text;
@@ -64,8 +96,8 @@ std::string between(const char* field, int value, int max) {
 std::string ModelDescription::faults() const {
   std::string faults =
       between("rows", rows, max_rows) + between("columns", columns, max_image_columns);
-  if (!(fov_down < fov_up && std::abs(fov_up) < std::numbers::pi / 2 &&
-        std::abs(fov_down) < std::numbers::pi / 2)) {
+  if (!(fov_down < fov_up && std::abs(fov_up) <= std::numbers::pi / 2 &&
+        std::abs(fov_down) <= std::numbers::pi / 2)) {
     faults += "fov_down must be below fov_up, both within -90..90 degrees\n";
   }
   faults += statistics_faults(statistics);
@@ -97,7 +129,7 @@ std::string in_words(const TrainedSensors& seen) {
 
 bool fits_better(const ModelDescription& model, const ModelDescription& other,
                  const SensorModel& sensor) {
-  if (!model.trained_for || !other.trained_for || sensor.pattern == ScanPattern::irregular)
+  if (!model.trained_for || !other.trained_for || sensor.pattern != ScanPattern::rings)
     return false;
   // Less than what sensors of one type differ by.
   constexpr double as_good = 0.1;
@@ -111,7 +143,7 @@ bool fits_better(const ModelDescription& model, const ModelDescription& other,
 
 ModelDescription for_sensor(ModelDescription model, const SensorModel& sensor) {
   if (!model.follow_sensor) return model;
-  model.rows = sensor.rings;
+  model.rows = image_rows(sensor, model.rows);
   model.fov_up = sensor.fov_up;
   model.fov_down = sensor.fov_down;
   if (sensor.rings <= few_beams) model.columns = std::min(model.columns, columns_of_few_beams);

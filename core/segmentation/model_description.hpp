@@ -80,8 +80,8 @@ struct ModelDescription {
   /// Upper and lower edge of the image [rad]; points beyond are clamped to the edge rows.
   double fov_up = 0.0;
   double fov_down = 0.0;
-  /// Trained for many sensors: the image takes rows and field of view from the sensor. See
-  /// for_sensor().
+  /// Trained for many sensors: the image takes its field of view from the sensor, and so many rows
+  /// as suit it. See for_sensor().
   bool follow_sensor = false;
   InputStatistics statistics;
 
@@ -120,8 +120,9 @@ void require_valid(const ModelDescription& model);
 [[nodiscard]] bool fits_better(const ModelDescription& model, const ModelDescription& other,
                                const SensorModel& sensor);
 
-/// The model with the image for this sensor. With follow_sensor: the sensor's rings as rows over
-/// its field of view, and for sensors of few rings a limit on the columns. Else unchanged.
+/// The model with the image for this sensor. With follow_sensor: the sensor's field of view in rows
+/// half way between its rings and `rows` of the model (at most twice the rings, and twice those
+/// rows; a multiple of 8), and for sensors of few rings a limit on the columns. Else unchanged.
 [[nodiscard]] ModelDescription for_sensor(ModelDescription model, const SensorModel& sensor);
 
 }  // namespace stillmap

@@ -318,7 +318,7 @@ std::string SimulationConfig::faults() const {
     out += std::string("simulation.") + field + " is " + std::to_string(value) + ", must be " +
            std::to_string(low) + " to " + std::to_string(high) + '\n';
   };
-  if (sensor.pattern == ScanPattern::irregular)
+  if (sensor.pattern != ScanPattern::rings)
     out += "simulation.sensor '" + sensor.name +
            "' has no rings: only lidars that turn are simulated\n";
   check(scans, 1, 100000, "scans");

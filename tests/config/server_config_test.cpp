@@ -129,7 +129,7 @@ TEST(ServerConfig, ReadsSeveralLidarsOfOneRobot) {
   EXPECT_TRUE(
       config.mount.T_base_lidar.translation().isApprox(Eigen::Vector3d(0.0, 0.0, 1.5), 1e-12));
   EXPECT_EQ(config.mapper.sensor.rings, 48);
-  EXPECT_EQ(config.mapper.sensor.pattern, ScanPattern::irregular);
+  EXPECT_EQ(config.mapper.sensor.pattern, ScanPattern::merged);
 }
 
 TEST(ServerConfig, RefusesLidarsThatCannotBeToldApart) {

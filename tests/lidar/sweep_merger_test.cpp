@@ -93,7 +93,7 @@ TEST(MergedSensor, SeesWhatTiltedLidarsSee) {
   const SensorModel merged = merged_sensor(std::vector{level, tilted});
   EXPECT_THAT(merged.faults(), IsEmpty());
   EXPECT_EQ(merged.rings, 32);
-  EXPECT_EQ(merged.pattern, ScanPattern::irregular);
+  EXPECT_EQ(merged.pattern, ScanPattern::merged);
   EXPECT_GE(merged.fov_up, 45.9 * deg);
   EXPECT_LE(merged.fov_up, 49.0 * deg);
   EXPECT_LE(merged.fov_down, -45.9 * deg);
