@@ -40,10 +40,35 @@ double median_of(std::vector<double>& values) {
   return *middle;
 }
 
+/// Whether each number, from 0 to the highest one, stands in the scan's ring field.
+std::vector<bool> ring_numbers(const Scan& scan) {
+  std::vector<bool> stands(std::size_t{*std::ranges::max_element(scan.ring)} + 1, false);
+  for (const std::uint16_t ring : scan.ring) stands[ring] = true;
+  return stands;
+}
+
+/// Takes the numbers out that are no rings: those before the first one that stands in the field
+/// (which may count from 1), and where a third of the others does not stand there either, all of
+/// these, since the field skips numbers. Else they are rings that have just seen nothing.
+void take_out_unused(const std::vector<bool>& stands, std::vector<double>& elevations) {
+  const auto first = std::ranges::find(stands, true) - stands.begin();
+  const std::ptrdiff_t used = std::ranges::count(stands, true);
+  const bool skips = 3 * used < 2 * (std::ssize(stands) - first);
+  std::vector<double> kept;
+  for (std::ptrdiff_t i = first; i < std::ssize(stands); ++i) {
+    const auto ring = static_cast<std::size_t>(i);
+    if (stands[ring] || !skips) kept.push_back(elevations[ring]);
+  }
+  elevations = std::move(kept);
+}
+
 /// Median elevation of every ring, NAN for rings with too few points, in the field's own order.
+/// Empty for a field of more rings than a sensor can have, which is something else.
 std::vector<double> ring_elevations(const Scan& scan) {
-  const std::size_t rings = std::size_t{*std::ranges::max_element(scan.ring)} + 1;
-  std::vector<std::vector<double>> of_ring(rings);
+  constexpr std::size_t max_rings = 256;
+  const std::vector<bool> stands = ring_numbers(scan);
+  if (stands.size() > max_rings) return {};
+  std::vector<std::vector<double>> of_ring(stands.size());
   for (std::size_t i = 0; i < scan.size(); ++i) {
     const double elevation = elevation_of(scan.points_lidar[i]);
     if (std::isfinite(elevation)) of_ring[scan.ring[i]].push_back(elevation);
@@ -52,6 +77,7 @@ std::vector<double> ring_elevations(const Scan& scan) {
   for (auto& values : of_ring) {
     elevations.push_back(values.size() < min_points_on_ring ? NAN : median_of(values));
   }
+  take_out_unused(stands, elevations);
   return elevations;
 }
 
@@ -129,10 +155,7 @@ std::optional<SensorModel> fit_beams(std::vector<double> elevations) {
 
 std::optional<SensorModel> fit_rings(const Scan& scan) {
   std::vector<double> elevations = ring_elevations(scan);
-  // A field of more rings than a sensor can have is something else.
-  if (elevations.size() < 4 || elevations.size() > 256 || !complete(elevations)) {
-    return std::nullopt;
-  }
+  if (elevations.size() < 4 || !complete(elevations)) return std::nullopt;
   std::ranges::sort(elevations, std::greater<>{});
   return fit_beams(std::move(elevations));
 }
@@ -265,10 +288,13 @@ std::optional<SensorModel> fit_sensor(const Scan& scan) {
 
 std::string sensor_mismatch(const Scan& scan, const SensorModel& sensor) {
   if (!scan.ring.empty()) {
-    const int highest = *std::ranges::max_element(scan.ring);
-    if (highest >= sensor.rings) {
-      return "the cloud's ring field reaches " + std::to_string(highest) + ", but sensor " +
-             sensor.name + " has only " + std::to_string(sensor.rings) + " rings";
+    // A field may count from 1, or skip numbers.
+    const std::vector<bool> stands = ring_numbers(scan);
+    const std::ptrdiff_t rings = std::ranges::count(stands, true);
+    if (rings > sensor.rings) {
+      return "the cloud's ring field reaches " + std::to_string(stands.size() - 1) + " (" +
+             std::to_string(rings) + " rings), but sensor " + sensor.name + " has only " +
+             std::to_string(sensor.rings) + " rings";
     }
   }
   const std::vector<double> elevations = sorted_elevations(scan);
@@ -286,8 +312,8 @@ std::string sensor_mismatch(const Scan& scan, const SensorModel& sensor) {
 std::string in_words(const SensorModel& sensor) {
   std::ostringstream text;
   text << sensor.name << ": "
-       << (sensor.pattern == ScanPattern::irregular ? "points anywhere"
-                                                    : std::to_string(sensor.rings) + " rings")
+       << (sensor.pattern != ScanPattern::rings ? "points anywhere"
+                                                : std::to_string(sensor.rings) + " rings")
        << std::fixed << std::setprecision(2) << " from " << sensor.fov_up / degree << " to "
        << sensor.fov_down / degree << " degrees of elevation";
   return text.str();

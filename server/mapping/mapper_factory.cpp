@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "config/loaders/model_file.hpp"
+#include "core/segmentation/segmenter.hpp"
 #include "server/mapping/async_segmenter.hpp"
 
 namespace stillmap::server {
@@ -68,8 +69,11 @@ Mapper MapperFactory::make_for(const SensorModel& sensor, MapperListeners listen
     segmenter = open_segmenter_(sensor);
   } catch (const std::exception& fault) {
     const std::string why = "for the lidar '" + sensor.name + "': " + fault.what();
-    spdlog::error("no labels {}", why);
+    const bool may_come_with_scans = labels_.source == LabelProvider::automatic;
+    spdlog::error("no labels {}{}", why,
+                  may_come_with_scans ? "; those that come with scans are taken" : "");
     segmenter = std::make_unique<UnavailableSegmenter>(why);
+    if (may_come_with_scans) segmenter = std::make_unique<FallbackSegmenter>(std::move(segmenter));
   }
   return make_with(mapper, std::move(segmenter), std::move(listeners));
 }

@@ -29,8 +29,8 @@ class MapperFactory {
   [[nodiscard]] bool knows_other_lidars() const { return open_segmenter_ != nullptr; }
   /// Logs where another model would suit this lidar better.
   void tell_of_better_model(const SensorModel& sensor) const;
-  /// For this lidar, with labels that are opened for it; where that fails, none, and the status
-  /// tells why.
+  /// For this lidar, with labels that are opened for it; where that fails, with none but those that
+  /// come with scans where they may (labels.source: auto), and the status tells why.
   [[nodiscard]] Mapper make_for(const SensorModel& sensor, MapperListeners listeners) const;
 
  private:

@@ -161,6 +161,45 @@ TEST(FitSensor, KnowsABuiltInSensorOfWhichSomeRingsSawNothing) {
   EXPECT_THAT(fit_sensor(scan_of(high_resolution, true))->name, HasSubstr("16 rings"));
 }
 
+/// With other numbers in the ring field.
+template <class Number>
+Scan renumbered(Scan scan, Number number) {
+  for (std::uint16_t& ring : scan.ring) ring = static_cast<std::uint16_t>(number(ring));
+  return scan;
+}
+
+TEST(FitSensor, CountsNoRingThatTheFieldDoesNotHave) {
+  SensorModel ouster;
+  ouster.rings = 32;
+  ouster.fov_up = 22.5 * degree;
+  ouster.fov_down = -22.5 * degree;
+  const auto from_one = [](int ring) { return ring + 1; };
+  const auto every_fourth = [](int ring) { return 4 * ring + 3; };
+  const Scan counted_from_one = renumbered(scan_of(ouster, true), from_one);
+  const Scan skipping = renumbered(scan_of(ouster, true), every_fourth);
+  for (const Scan& scan : {counted_from_one, skipping}) {
+    const auto fitted = fit_sensor(scan);
+    ASSERT_TRUE(fitted);
+    ASSERT_EQ(fitted->rings, 32);
+    for (int ring = 0; ring < 32; ++ring)
+      EXPECT_NEAR(fitted->beam_elevation(ring), ouster.beam_elevation(ring), 0.01 * degree) << ring;
+    EXPECT_THAT(sensor_mismatch(scan, *fitted), IsEmpty());
+  }
+  EXPECT_EQ(fit_sensor(renumbered(scan_of(vlp_16(), true), from_one))->name, "VLP-16");
+}
+
+TEST(FitSensor, CountsRingsThatStandInTheFieldWithoutAPoint) {
+  SensorModel ouster;
+  ouster.rings = 32;
+  ouster.fov_up = 22.5 * degree;
+  ouster.fov_down = -22.5 * degree;
+  Scan scan = scan_of(ouster, true);
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    if (scan.ring[i] < 2 || scan.ring[i] > 26) scan.points_lidar[i].setZero();
+  }
+  EXPECT_EQ(fit_sensor(scan)->rings, 32);
+}
+
 TEST(SensorRecognition, TakesTheFirstScanOfEnoughPoints) {
   SensorRecognition recognition;
   Scan few = scan_of(vlp_16(), true);

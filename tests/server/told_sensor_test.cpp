@@ -36,12 +36,17 @@ class ToldSensor : public testing::Test {
   /// Sends so many scans and waits until they are worked off.
   void drive(int scans, const std::shared_ptr<const SensorModel>& sensor) {
     for (int k = 0; k < scans; ++k)
-      queue_.push_dropping_oldest({test::room_scan(next_++), "lidar", Clock::now(), sensor});
+      queue_.push_dropping_oldest({scan(), "lidar", Clock::now(), sensor});
     ASSERT_TRUE(test::eventually([this] {
       const dds::ServerStatus now = status();
       return now.counter("scans_mapped") + now.dropped() >= static_cast<std::uint64_t>(next_);
     }));
     mapping_->publish_now();
+  }
+  [[nodiscard]] Scan scan() {
+    Scan scan = test::room_scan(next_++);
+    if (!are_labelled_) scan.labels.clear();
+    return scan;
   }
   [[nodiscard]] dds::ServerStatus status() const { return report_.status(); }
   /// How far the last pose is from the true one.
@@ -54,6 +59,7 @@ class ToldSensor : public testing::Test {
   ServerConfig config_;
   std::vector<std::string> opened_;
   bool fails_ = false;
+  bool are_labelled_ = true;
   std::shared_ptr<const SensorModel> told_ = std::make_shared<const SensorModel>(vlp_16());
   ScanQueue queue_{30};
   Statistics statistics_;
@@ -102,6 +108,7 @@ TEST_F(ToldSensor, LateGoesOnInTheMapWhereItIs) {
 
 TEST_F(ToldSensor, WithoutLabelsForItIsMappedWithoutAndSaysWhy) {
   fails_ = true;
+  config_.labels.source = LabelProvider::model;
   start();
   drive(6, told_);
   EXPECT_EQ(status().counter("scans_mapped"), 6U);
@@ -109,6 +116,20 @@ TEST_F(ToldSensor, WithoutLabelsForItIsMappedWithoutAndSaysWhy) {
   EXPECT_THAT(status().reason, HasSubstr("VLP-16"));
   EXPECT_THAT(status().reason, HasSubstr("no images of so many rows"));
   EXPECT_LT(error_m(), 0.1);
+}
+
+TEST_F(ToldSensor, WithoutANetworkForItTakesTheLabelsOfItsScans) {
+  fails_ = true;
+  config_.labels.source = LabelProvider::automatic;
+  start();
+  drive(4, told_);
+  EXPECT_EQ(status().counter("label_failures"), 0U);
+  EXPECT_EQ(status().label_source, "stream, else none");
+  are_labelled_ = false;
+  drive(2, told_);
+  EXPECT_EQ(status().counter("scans_mapped"), 6U);
+  EXPECT_EQ(status().counter("label_failures"), 2U);
+  EXPECT_THAT(status().reason, HasSubstr("no images of so many rows"));
 }
 
 TEST_F(ToldSensor, LiveDoesNotBeginBeforeScansThatWaitedForItsNetwork) {
