@@ -31,6 +31,8 @@ class LabelSynchronizer {
 
   /// Name of the label source, for the status.
   [[nodiscard]] std::string name() const { return segmentation_->name(); }
+  /// See Segmenter.
+  void set_mount(const Eigen::Isometry3d& T_base_lidar) { segmentation_->set_mount(T_base_lidar); }
 
   /// What the pipeline said when a scan was submitted.
   struct Submission {

@@ -147,6 +147,10 @@ class Mapper {
   /// Keeps at least this many of the last poses, and at most twice as many.
   void limit_trajectory(std::size_t poses) { max_poses_ = poses; }
   [[nodiscard]] std::string label_source() const { return label_synchronizer_.name(); }
+  /// How the lidar of the next scans sits on its robot, for the label source (see Segmenter).
+  void set_mount(const Eigen::Isometry3d& T_base_lidar) {
+    label_synchronizer_.set_mount(T_base_lidar);
+  }
   [[nodiscard]] std::shared_ptr<const MapSnapshot> map_snapshot() {
     return static_map_.map().view();
   }

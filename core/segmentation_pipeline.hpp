@@ -46,6 +46,9 @@ class SegmentationPipeline {
   };
   /// Submits a prepared scan for segmentation.
   [[nodiscard]] virtual Output submit(const Scan& scan) = 0;
+
+  /// See Segmenter.
+  virtual void set_mount(const Eigen::Isometry3d& /*T_base_lidar*/) {}
 };
 
 /// Segments every scan within submit(), however long that takes.
@@ -59,6 +62,9 @@ class BlockingSegmenter final : public SegmentationPipeline {
     Output output;
     output.finished.push_back({scan.stamp_ns, source_->segment(scan)});
     return output;
+  }
+  void set_mount(const Eigen::Isometry3d& T_base_lidar) override {
+    source_->set_mount(T_base_lidar);
   }
 
  private:

@@ -80,7 +80,8 @@ void add_operation_options(CLI::App& program, OperationArguments& operation) {
 Arguments check_config(const std::string& file) {
   ConfigReport report;
   const ServerConfig config = load_server_config(file, report);
-  const auto labels = open_segmenter(config.labels, config.mapper.sensor, true);
+  const auto labels =
+      open_segmenter(config.labels, config.mapper.sensor, true, config.mount.T_base_lidar);
   if (!config.dds.security.empty()) {
     static_cast<void>(dds::load_identity(config.dds.security));
     for (const std::string& warning :

@@ -52,7 +52,9 @@ std::string topics_of_scans(const stillmap::ServerConfig& config) {
 std::unique_ptr<stillmap::Segmenter> open_labels(const stillmap::ServerConfig& config,
                                                  const stillmap::SensorModel& sensor) {
   const bool adaptive_width = stillmap::server::segmentation_budget(config).count() > 0;
-  auto labels = stillmap::open_segmenter(config.labels, sensor, adaptive_width);
+  // A mount that /tf_static tells is not known yet.
+  auto labels =
+      stillmap::open_segmenter(config.labels, sensor, adaptive_width, config.mount.T_base_lidar);
   if (const std::string details = labels->details(); !details.empty()) {
     spdlog::info("labels by {}: {}", labels->name(), details);
   }

@@ -59,7 +59,8 @@ std::unique_ptr<SharedMapper> make_mapper(const SensorModel& sensor, const std::
     throw std::invalid_argument("prepare." + fault->field + ": " + fault->text);
   use_sensor(sensor, config.automatic_sensor, config.mapper);
   auto mapper = std::make_unique<Mapper>(
-      config.mapper, open_segmenter(labels_from(config.labels, labels), sensor));
+      config.mapper,
+      open_segmenter(labels_from(config.labels, labels), sensor, false, config.mount.T_base_lidar));
   mapper->reset(new_map_id());
   return std::make_unique<SharedMapper>(std::move(mapper));
 }
@@ -152,7 +153,8 @@ void bind_mapper(py::module_& module) {
            py::arg("config") = py::none(),
            "sensor: a Sensor. labels: \"none\" (pure geometry), \"scan\" (those of the scans), "
            "\"model\" (the network that comes with Stillmap), or a folder with a model. config: a "
-           "server file whose mapper settings are used. Raises ConfigError, ValueError.")
+           "server file whose mapper settings are used, and whose mount tells the network how the "
+           "lidar leans. Raises ConfigError, ValueError.")
       .def("process", &process, py::arg("scan"), py::arg("T_map_lidar_prior") = py::none(),
            "Maps a Scan. T_map_lidar_prior: (4, 4), replaces the constant-velocity prediction. "
            "None for a scan that cannot be mapped; last_rejection says why.")

@@ -118,6 +118,11 @@ void read_model(YamlSection file, ModelDescription& model) {
   file.text("sensor", model.sensor);
   file.text("training", model.training);
   file.text("accuracy", model.accuracy);
+  if (file.has("lidar_height_m")) {
+    double height_m = 0.0;
+    file.number("lidar_height_m", height_m, {0.1, 4.0});
+    model.lidar_height_m = height_m;
+  }
   if (file.has("trained_for")) model.trained_for = read_trained_for(file.section("trained_for"));
   read_image(file.section("image"), model);
   read_statistics(file.section("statistics"), model.statistics);
@@ -128,8 +133,10 @@ void read_model(YamlSection file, ModelDescription& model) {
 }
 
 std::unique_ptr<Segmenter> open_network_labels(const LabelsConfig& labels,
-                                               const SensorModel& sensor, bool adaptive_width) {
-  ModelDescription model = for_sensor(load_model_description(find_model(labels.model)), sensor);
+                                               const SensorModel& sensor, bool adaptive_width,
+                                               const LidarTilt& tilt) {
+  ModelDescription model =
+      for_sensor(load_model_description(find_model(labels.model)), sensor, tilt);
   if (labels.image_columns == 0) {
     return adaptive_width ? open_multi_resolution_model(model, labels.engine)
                           : open_model(model, labels.engine);
@@ -183,19 +190,15 @@ ModelDescription load_model_description(const fs::path& folder) {
 }
 
 std::unique_ptr<Segmenter> open_segmenter(const LabelsConfig& labels, const SensorModel& sensor,
-                                          bool adaptive_width) {
-  switch (labels.source) {
-    case LabelProvider::automatic:
-      return std::make_unique<FallbackSegmenter>(
-          open_network_labels(labels, sensor, adaptive_width));
-    case LabelProvider::model:
-      return open_network_labels(labels, sensor, adaptive_width);
-    case LabelProvider::stream:
-      return std::make_unique<PassthroughSegmenter>();
-    case LabelProvider::none:
-      break;
-  }
-  return std::make_unique<NullSegmenter>();
+                                          bool adaptive_width,
+                                          const Eigen::Isometry3d& T_base_lidar) {
+  if (labels.source == LabelProvider::stream) return std::make_unique<PassthroughSegmenter>();
+  if (labels.source == LabelProvider::none) return std::make_unique<NullSegmenter>();
+  std::unique_ptr<Segmenter> segmenter =
+      open_network_labels(labels, sensor, adaptive_width, LidarTilt(T_base_lidar.linear()));
+  segmenter->set_mount(T_base_lidar);
+  if (labels.source == LabelProvider::model) return segmenter;
+  return std::make_unique<FallbackSegmenter>(std::move(segmenter));
 }
 
 }  // namespace stillmap

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -19,10 +20,11 @@ namespace stillmap {
 
 /// The label source that the configuration asks for, for scans of this sensor. `adaptive_width`:
 /// able to look more coarsely, where the model can and the configuration does not say how finely.
-/// Throws ConfigError or ModelError.
-[[nodiscard]] std::unique_ptr<Segmenter> open_segmenter(const LabelsConfig& labels,
-                                                        const SensorModel& sensor,
-                                                        bool adaptive_width = false);
+/// `T_base_lidar`: where the lidar sits on its robot, as far as that is known (see
+/// Segmenter::set_mount). Throws ConfigError or ModelError.
+[[nodiscard]] std::unique_ptr<Segmenter> open_segmenter(
+    const LabelsConfig& labels, const SensorModel& sensor, bool adaptive_width = false,
+    const Eigen::Isometry3d& T_base_lidar = Eigen::Isometry3d::Identity());
 
 /// What to tell, once, where the network of another model that known_models() lists was trained for
 /// lidars more like this one than the configured one: its name, both models' lidars and its

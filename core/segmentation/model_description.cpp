@@ -67,14 +67,25 @@ double beams_by_step(const SensorModel& sensor, int usual_rows) {
 /// most every second one does, as between the beams of an HDL-64E, and no image has more than twice
 /// the model's. The beams of several lidars share a wider field of view, and lie between each other
 /// somewhere. Bands have no empty rows between them that others would fill.
-int image_rows(const SensorModel& sensor, int usual_rows) {
+double image_rows(const SensorModel& sensor, int usual_rows) {
   double rows = sensor.rings;
   if (sensor.pattern != ScanPattern::irregular) {
     rows = 0.5 * (beams_by_step(sensor, usual_rows) + usual_rows);
     if (sensor.pattern == ScanPattern::merged) rows = std::max<double>(rows, usual_rows);
     rows = std::min(rows, 2.0 * sensor.rings);
   }
-  rows = std::min(rows, 2.0 * usual_rows);
+  return std::min(rows, 2.0 * usual_rows);
+}
+
+/// The wider field of view of a turned image has as many rows for an angle, as far as half as many
+/// more go.
+double growth_of_rows(const ModelDescription& upright, const LidarTilt& tilt) {
+  const ProjectionModel widened = tilt.widened(upright.projection());
+  const double growth = (widened.fov_up - widened.fov_down) / (upright.fov_up - upright.fov_down);
+  return std::clamp(growth, 1.0, 1.5);
+}
+
+int to_multiple(double rows) {
   return std::max(1, static_cast<int>(std::lround(rows / row_multiple))) * row_multiple;
 }
 
@@ -141,11 +152,12 @@ bool fits_better(const ModelDescription& model, const ModelDescription& other,
   return variety(*model.trained_for) < variety(*other.trained_for);
 }
 
-ModelDescription for_sensor(ModelDescription model, const SensorModel& sensor) {
+ModelDescription for_sensor(ModelDescription model, const SensorModel& sensor,
+                            const LidarTilt& tilt) {
   if (!model.follow_sensor) return model;
-  model.rows = image_rows(sensor, model.rows);
   model.fov_up = sensor.fov_up;
   model.fov_down = sensor.fov_down;
+  model.rows = to_multiple(image_rows(sensor, model.rows) * growth_of_rows(model, tilt));
   if (sensor.rings <= few_beams) model.columns = std::min(model.columns, columns_of_few_beams);
   return model;
 }

@@ -14,6 +14,7 @@
 #include "core/lidar/sensor_model.hpp"
 #include "core/segmentation/int8_calibration.hpp"
 #include "core/segmentation/knn_postprocess.hpp"
+#include "core/segmentation/lidar_tilt.hpp"
 #include "core/segmentation/voxel_votes.hpp"
 
 namespace stillmap {
@@ -95,6 +96,9 @@ struct ModelDescription {
   bool mask_first_point = false;
   /// Without it the network cannot run in 8-bit integers.
   std::optional<Int8Calibration> int8;
+  /// Height above the ground of most lidars that it has seen [m]; of a lidar at another one z is
+  /// moved to that. Nothing: z stays.
+  std::optional<double> lidar_height_m;
 
   /// Values of one input: channels x rows x columns.
   [[nodiscard]] std::size_t input_size() const {
@@ -122,7 +126,9 @@ void require_valid(const ModelDescription& model);
 
 /// The model with the image for this sensor. With follow_sensor: the sensor's field of view in rows
 /// half way between its rings and `rows` of the model (at most twice the rings, and twice those
-/// rows; a multiple of 8), and for sensors of few rings a limit on the columns. Else unchanged.
-[[nodiscard]] ModelDescription for_sensor(ModelDescription model, const SensorModel& sensor);
+/// rows; a multiple of 8), and for sensors of few rings a limit on the columns. Of a sensor that
+/// leans so much that its image is turned, up to half as many rows more. Else unchanged.
+[[nodiscard]] ModelDescription for_sensor(ModelDescription model, const SensorModel& sensor,
+                                          const LidarTilt& tilt = {});
 
 }  // namespace stillmap

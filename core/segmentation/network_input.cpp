@@ -54,33 +54,35 @@ constexpr float max_remission = 1.0F;
 
 std::vector<float> make_network_input(const Scan& scan, const RangeImage& image,
                                       const ModelDescription& model) {
-  assert(image.point_count() == scan.size());
-  assert(scan.intensity.empty() || scan.intensity.size() == scan.size());
+  return make_network_input(scan.points_lidar, scan.intensity, image, model);
+}
+
+std::vector<float> make_network_input(std::span<const Eigen::Vector3f> points,
+                                      std::span<const float> intensity, const RangeImage& image,
+                                      const ModelDescription& model, float raised_m) {
+  assert(image.point_count() == points.size());
+  assert(intensity.empty() || intensity.size() == points.size());
   const std::size_t pixels = image.pixel_count();
   const InputStatistics& statistics = model.statistics;
-  const float factor = remission_factor(scan.intensity, statistics);
-  const bool has_remission = !scan.intensity.empty() && factor > 0.0F;
+  const float factor = remission_factor(intensity, statistics);
+  const bool has_remission = !intensity.empty() && factor > 0.0F;
   const bool has_slope = statistics.channels > index(InputChannel::slope);
   const std::vector<float> slope_rad =
-      has_slope ? surface_slope_rad(image, scan.points_lidar) : std::vector<float>();
+      has_slope ? surface_slope_rad(image, points) : std::vector<float>();
   std::vector<float> input(statistics.channels * pixels, 0.0F);
   for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
     const std::int32_t nearest = image.nearest()[pixel];
     if (nearest == RangeImage::none || (model.mask_first_point && nearest == 0)) continue;
     const auto point = static_cast<std::size_t>(nearest);
-    const Eigen::Vector3f& p_lidar = scan.points_lidar[point];
+    const Eigen::Vector3f& p = points[point];
     // Of another scale, retro-reflectors would be brighter than anything that was learned. NaN
     // stays.
-    const float remission = !has_remission ? statistics.mean[index(InputChannel::remission)]
-                            : factor == 1.0F
-                                ? scan.intensity[point]
-                                : std::min(factor * scan.intensity[point], max_remission);
-    const std::array<float, max_input_channels> values{image.range_m()[pixel],
-                                                       p_lidar.x(),
-                                                       p_lidar.y(),
-                                                       p_lidar.z(),
-                                                       remission,
-                                                       has_slope ? slope_rad[pixel] : 0.0F};
+    const float remission = !has_remission   ? statistics.mean[index(InputChannel::remission)]
+                            : factor == 1.0F ? intensity[point]
+                                             : std::min(factor * intensity[point], max_remission);
+    const std::array<float, max_input_channels> values{
+        image.range_m()[pixel], p.x(),     p.y(),
+        p.z() + raised_m,       remission, has_slope ? slope_rad[pixel] : 0.0F};
     for (std::size_t c = 0; c < statistics.channels; ++c) {
       const float normalised = (values[c] - statistics.mean[c]) / statistics.deviation[c];
       // Only remission can be NaN here; convolutions would spread it to the surroundings.

@@ -16,6 +16,13 @@ namespace stillmap {
 /// training set's is scaled to it. `image` is the scan's.
 [[nodiscard]] std::vector<float> make_network_input(const Scan& scan, const RangeImage& image,
                                                     const ModelDescription& model);
+/// The same of a scan whose points are turned to other axes; `image` is that of the scan as it was
+/// or of the turned points. `raised_m` is added to z.
+[[nodiscard]] std::vector<float> make_network_input(std::span<const Eigen::Vector3f> points,
+                                                    std::span<const float> intensity,
+                                                    const RangeImage& image,
+                                                    const ModelDescription& model,
+                                                    float raised_m = 0.0F);
 
 /// A synthetic input with values of both signs that differ from pixel to pixel, for a trial run of
 /// a network when it is loaded.

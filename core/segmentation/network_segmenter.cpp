@@ -36,6 +36,15 @@ std::unique_ptr<SegmentationNetwork> open_with_columns(ModelDescription model, i
   }
 }
 
+/// The robot's origin is on the ground, as maps have it. A mount at that height says nothing of it,
+/// and no vehicle carries its lidar higher than the highest here.
+std::optional<double> height_above_ground_m(const Eigen::Isometry3d& T_base_lidar) {
+  constexpr double lowest_m = 0.1, highest_m = 4.0;
+  const double height_m = T_base_lidar.translation().z();
+  if (height_m < lowest_m || height_m > highest_m) return std::nullopt;
+  return height_m;
+}
+
 PointLabels labels_of_own_pixel(const RangeImage& image, const PixelLabels& pixels) {
   return {.classes = unproject(image, std::span<const SemanticClass>(pixels.classes),
                                SemanticClass::unlabeled),
@@ -92,6 +101,16 @@ void NetworkSegmenter::set_parallelism(Parallelism parallelism) {
   parallelism_ = parallelism;
 }
 
+void NetworkSegmenter::set_mount(const Eigen::Isometry3d& T_base_lidar) {
+  const std::scoped_lock lock(mutex_);
+  mount_ = {LidarTilt(T_base_lidar.linear()), height_above_ground_m(T_base_lidar)};
+}
+
+float NetworkSegmenter::raised_m(const Mount& mount) const {
+  if (!mount.height_m || !model_.lidar_height_m) return 0.0F;
+  return static_cast<float>(*mount.height_m - *model_.lidar_height_m);
+}
+
 int NetworkSegmenter::image_columns() const {
   const std::scoped_lock lock(mutex_);
   return levels_[current_level_].columns;
@@ -110,20 +129,21 @@ PointLabels NetworkSegmenter::segment(const Scan& scan) {
   const std::size_t level = current_level_;
   const int columns = levels_[level].columns;
   const Parallelism parallelism = parallelism_;
+  const Mount mount = mount_;
   lock.unlock();
   if (parallelism == Parallelism::across_scans && concurrent_scans_ > 1) {
     if (auto network = take_one_threaded(level)) {
       // The loops of the projection and of the votes in this thread, too.
       tbb::task_arena this_thread(1);
       PointLabels labels =
-          this_thread.execute([&] { return segment_with(*network, columns, scan); });
+          this_thread.execute([&] { return segment_with(*network, columns, mount, scan); });
       lock.lock();
       levels_[level].idle.push_back(std::move(network));
       return labels;
     }
   }
   const std::scoped_lock all_threads(all_threads_);
-  return segment_with(*levels_[level].network, columns, scan);
+  return segment_with(*levels_[level].network, columns, mount, scan);
 }
 
 std::unique_ptr<SegmentationNetwork> NetworkSegmenter::take_one_threaded(std::size_t level) {
@@ -145,15 +165,21 @@ std::unique_ptr<SegmentationNetwork> NetworkSegmenter::take_one_threaded(std::si
 }
 
 PointLabels NetworkSegmenter::segment_with(SegmentationNetwork& network, int columns,
-                                           const Scan& scan) const {
+                                           const Mount& mount, const Scan& scan) const {
+  const LidarTilt& tilt = mount.tilt;
+  std::vector<Eigen::Vector3f> turned;
+  if (!tilt.is_upright()) turned = tilt.turned(scan.points_lidar);
+  const std::span<const Eigen::Vector3f> points = turned.empty() ? scan.points_lidar : turned;
   ProjectionModel projection = model_.projection();
+  if (model_.follow_sensor) projection = tilt.widened(projection);
   projection.columns = columns;
-  const RangeImage image(scan.points_lidar, projection);
-  PixelOutputs outputs = network.run(make_network_input(scan, image, model_));
+  const RangeImage image(tilt.turns_image() ? points : scan.points_lidar, projection);
+  PixelOutputs outputs =
+      network.run(make_network_input(points, scan.intensity, image, model_, raised_m(mount)));
   const PixelLabels pixels = pixel_labels(std::move(outputs), model_);
   PointLabels labels =
       model_.knn ? knn_labels(image, pixels, *model_.knn) : labels_of_own_pixel(image, pixels);
-  if (model_.voxel_votes) vote_in_voxels(scan.points_lidar, *model_.voxel_votes, labels);
+  if (model_.voxel_votes) vote_in_voxels(points, *model_.voxel_votes, labels);
   return labels;
 }
 

@@ -4,9 +4,11 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/segmentation/lidar_tilt.hpp"
 #include "core/segmentation/model_description.hpp"
 #include "core/segmentation/open_network.hpp"
 #include "core/segmentation/segmentation_network.hpp"
@@ -42,6 +44,7 @@ class NetworkSegmenter final : public Segmenter {
   void set_parallelism(Parallelism parallelism) override;
   [[nodiscard]] int image_columns() const override;
   [[nodiscard]] PointLabels segment(const Scan& scan) override;
+  void set_mount(const Eigen::Isometry3d& T_base_lidar) override;
 
  private:
   using Networks = std::vector<std::unique_ptr<SegmentationNetwork>>;
@@ -53,8 +56,17 @@ class NetworkSegmenter final : public Segmenter {
     Networks idle;
   };
 
+  /// Where the lidar is on its robot.
+  struct Mount {
+    LidarTilt tilt;
+    /// Above the ground, where that is known.
+    std::optional<double> height_m;
+  };
+
   [[nodiscard]] PointLabels segment_with(SegmentationNetwork& network, int columns,
-                                         const Scan& scan) const;
+                                         const Mount& mount, const Scan& scan) const;
+  /// What brings z to the heights that the model has seen [m].
+  [[nodiscard]] float raised_m(const Mount& mount) const;
   /// A network of one thread that does not run; nothing where the model cannot be opened any more.
   [[nodiscard]] std::unique_ptr<SegmentationNetwork> take_one_threaded(std::size_t level);
 
@@ -67,6 +79,7 @@ class NetworkSegmenter final : public Segmenter {
   mutable std::mutex mutex_;
   Parallelism parallelism_ = Parallelism::within_scan;
   std::size_t current_level_ = 0;
+  Mount mount_;
   /// Held while a network of all threads runs.
   std::mutex all_threads_;
 };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -49,6 +50,11 @@ class Segmenter {
   [[nodiscard]] virtual bool has_labels(const Scan& /*scan*/) const { return false; }
   /// Classes of the scan's points; empty when there are none for this scan.
   [[nodiscard]] virtual PointLabels segment(const Scan& scan) = 0;
+
+  /// How the lidar of the next scans sits on its robot, whose z axis points up from the ground;
+  /// without it, upright, at a height that is not known. Nor is it with a z below 0.1 m. May be
+  /// called while segment() works.
+  virtual void set_mount(const Eigen::Isometry3d& /*T_base_lidar*/) {}
 };
 
 /// Labels that come with the scan, from a dataset or a point cloud's label field, with confidence 1
@@ -93,6 +99,9 @@ class FallbackSegmenter final : public Segmenter {
     return has_known_class(scan.labels);
   }
   [[nodiscard]] PointLabels segment(const Scan& scan) override;
+  void set_mount(const Eigen::Isometry3d& T_base_lidar) override {
+    fallback_->set_mount(T_base_lidar);
+  }
 
  private:
   std::unique_ptr<Segmenter> fallback_;

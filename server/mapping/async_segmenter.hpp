@@ -39,6 +39,9 @@ class AsyncSegmenter final : public SegmentationPipeline {
   [[nodiscard]] std::string name() const override { return name_; }
   [[nodiscard]] bool may_skip_scans() const override { return budget_.count() > 0; }
   [[nodiscard]] Output submit(const Scan& scan) override;
+  void set_mount(const Eigen::Isometry3d& T_base_lidar) override {
+    source_->set_mount(T_base_lidar);
+  }
 
  private:
   using Clock = std::chrono::steady_clock;

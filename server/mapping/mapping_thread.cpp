@@ -327,6 +327,7 @@ void MappingThread::map(QueuedScan queued) {
   if (use_sensor(queued.sensor) && is_live_ && queue_.waiting() > 0)
     return drop({"sensor_told", "the network was made ready for the lidar that this scan told"});
   if (!locate_lidar(queued)) return drop({"unknown_frame", frames_.missing()});
+  mapper_.set_mount(frames_.T_base_lidar());
   // A clock that is being set back: a correction, which tells times apart, is to meet none of after
   // that. Now no scan waits for it: none is mapped until the mapper believes the clock.
   if (corrector_.is_running() && steps_back_ >= steps_of_set_clock) end_correction();

@@ -130,6 +130,21 @@ TEST_F(EvaluateCommandTest, RunsTheNetworkOnAnImageOfTheWidthAskedFor) {
   EXPECT_EQ(run(command + " --columns 9000").exit_code, 2);
 }
 
+TEST_F(EvaluateCommandTest, TellsTheNetworkHowTheLidarLeans) {
+  const std::string mount = " --mount 0,0,1.7,180,0,0";
+  ASSERT_EQ(run("simulate " + path("hanging") + " --sensor vlp_16 --scans 1" + mount).exit_code, 0);
+  const std::string command = "evaluate segmentation --json --truth " + path("hanging");
+  const auto accuracy = [&](const std::string& more) {
+    const ProcessResult result = run(command + more);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(result.out).at("accuracy").get<double>();
+  };
+  EXPECT_GT(accuracy(mount), accuracy("") + 0.2);
+  const ProcessResult both = run(command + mount + " --predictions " + path("hanging/labels"));
+  EXPECT_EQ(both.exit_code, 2);
+  EXPECT_THAT(both.err, HasSubstr("--mount"));
+}
+
 TEST_F(EvaluateCommandTest, ScoresSeveralSequencesEachTogetherAndByRange) {
   simulate("city", 1);
   simulate("other", 1);

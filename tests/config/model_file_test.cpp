@@ -113,6 +113,13 @@ TEST(ModelFile, ReadsWhatItWasTrainedFor) {
               HasSubstr("trained_for.fov_down_deg"));
 }
 
+TEST(ModelFile, ReadsTheHeightOfItsLidars) {
+  EXPECT_FALSE(load_model(sound).lidar_height_m.has_value());
+  const std::string field = "lidar_height_m: 1.5\n";
+  EXPECT_EQ(load_model(sound + field).lidar_height_m, 1.5);
+  EXPECT_THAT(refusal_of(sound + field, "_m: 1.5", "_m: 15"), HasSubstr("lidar_height_m"));
+}
+
 TEST(BetterModel, IsTheOneThatWasTrainedForSuchLidarsMostOfAll) {
   const auto better = [](const char* used, const SensorModel& sensor) {
     return better_model({.source = LabelProvider::model, .model = used, .engine = {}}, sensor);
@@ -189,6 +196,17 @@ TEST(ModelFolder, AFolderOfAnotherKindHidesNoModel) {
   const std::filesystem::path found = find_model("street");
   std::filesystem::current_path(before);
   EXPECT_TRUE(std::filesystem::exists(found / "model.yaml")) << found;
+}
+
+TEST(OpenSegmenter, GivesALidarThatLeansMoreRows) {
+  const auto details = [](const Eigen::Isometry3d& T_base_lidar) {
+    return open_segmenter({.source = LabelProvider::automatic, .engine = {}}, vlp_16(), false,
+                          T_base_lidar)
+        ->details();
+  };
+  EXPECT_THAT(details(Eigen::Isometry3d::Identity()), HasSubstr("image 32x1536"));
+  EXPECT_THAT(details(Eigen::Isometry3d(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY()))),
+              HasSubstr("image 48x1536"));
 }
 
 }  // namespace

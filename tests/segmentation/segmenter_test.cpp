@@ -44,6 +44,11 @@ class AllCars final : public Segmenter {
     return {.classes = std::vector(scan.size(), SemanticClass::car),
             .confidence = std::vector(scan.size(), 0.5F)};
   }
+  void set_mount(const Eigen::Isometry3d& T_base_lidar) override {
+    height_m = T_base_lidar.translation().z();
+  }
+
+  double height_m = 0.0;
 };
 
 TEST(FallbackSegmenter, UsesTheFallbackOnlyForScansWithoutLabels) {
@@ -62,6 +67,14 @@ TEST(FallbackSegmenter, UsesTheFallbackWhereNoClassIsKnown) {
   scan.labels.assign(scan.size(), SemanticClass::unlabeled);
   EXPECT_FALSE(labels.has_labels(scan));
   EXPECT_EQ(labels.segment(scan).classes[0], SemanticClass::car);
+}
+
+TEST(FallbackSegmenter, TellsTheFallbackTheMount) {
+  auto cars = std::make_unique<AllCars>();
+  const AllCars& told = *cars;
+  FallbackSegmenter labels(std::move(cars));
+  labels.set_mount(Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, 1.5)));
+  EXPECT_EQ(told.height_m, 1.5);
 }
 
 }  // namespace

@@ -19,6 +19,20 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using Clock = std::chrono::steady_clock;
 
+/// Keeps the mount that it was told last.
+class MountKeeper final : public Segmenter {
+ public:
+  explicit MountKeeper(Eigen::Isometry3d& T_base_lidar) : T_base_lidar_(T_base_lidar) {}
+  [[nodiscard]] std::string name() const override { return "mount keeper"; }
+  [[nodiscard]] PointLabels segment(const Scan& scan) override {
+    return PassthroughSegmenter().segment(scan);
+  }
+  void set_mount(const Eigen::Isometry3d& T_base_lidar) override { T_base_lidar_ = T_base_lidar; }
+
+ private:
+  Eigen::Isometry3d& T_base_lidar_;
+};
+
 class ToldSensor : public testing::Test {
  protected:
   ToldSensor() { config_.input.delivery = DeliveryMode::every; }
@@ -28,7 +42,7 @@ class ToldSensor : public testing::Test {
     helpers.open_segmenter = [this](const SensorModel& sensor) {
       opened_.push_back(sensor.name);
       if (fails_) throw ModelError("street", "has no images of so many rows");
-      return std::make_unique<PassthroughSegmenter>();
+      return std::make_unique<MountKeeper>(T_base_lidar_told_);
     };
     mapping_.emplace(config_, std::make_unique<PassthroughSegmenter>(), std::nullopt, nullptr,
                      queue_, statistics_, latest_map_, helpers);
@@ -60,6 +74,7 @@ class ToldSensor : public testing::Test {
   std::vector<std::string> opened_;
   bool fails_ = false;
   bool are_labelled_ = true;
+  Eigen::Isometry3d T_base_lidar_told_ = Eigen::Isometry3d::Identity();
   std::shared_ptr<const SensorModel> told_ = std::make_shared<const SensorModel>(vlp_16());
   ScanQueue queue_{30};
   Statistics statistics_;
@@ -90,6 +105,15 @@ TEST_F(ToldSensor, AsConfiguredChangesNothing) {
   drive(4, told_);
   EXPECT_THAT(opened_, IsEmpty());
   EXPECT_EQ(status().sensor, "VLP-16");
+}
+
+TEST_F(ToldSensor, HasItsMountToldToWhatLabelsItsScans) {
+  config_.frames.base = "base_link";
+  config_.mount.T_base_lidar =
+      Eigen::Translation3d(0.5, 0.0, 1.2) * Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY());
+  start();
+  drive(2, told_);
+  EXPECT_TRUE(T_base_lidar_told_.isApprox(config_.mount.T_base_lidar));
 }
 
 TEST_F(ToldSensor, LateGoesOnInTheMapWhereItIs) {

@@ -143,9 +143,11 @@ LabelsConfig labels_config(const MapperArguments& arguments, const ScanDataset& 
 }  // namespace
 
 std::unique_ptr<Segmenter> make_segmenter(const MapperArguments& arguments,
-                                          const ScanDataset& dataset) {
+                                          const ScanDataset& dataset,
+                                          const Eigen::Isometry3d& T_base_lidar) {
   return open_segmenter(labels_config(arguments, dataset),
-                        mapper_config(arguments, dataset.suggested_sensor()).sensor);
+                        mapper_config(arguments, dataset.suggested_sensor()).sensor, false,
+                        T_base_lidar);
 }
 
 std::string describe_model(const MapperArguments& arguments, const ScanDataset& dataset,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -52,9 +53,11 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments);
 /// Throws ConfigError or std::invalid_argument.
 [[nodiscard]] MapperConfig mapper_config(const MapperArguments& arguments,
                                          const SensorModel& suggested_sensor);
-/// Throws ConfigError, ModelError or std::invalid_argument.
-[[nodiscard]] std::unique_ptr<Segmenter> make_segmenter(const MapperArguments& arguments,
-                                                        const ScanDataset& dataset);
+/// For scans of a lidar that sits there on its robot; without, upright. Throws ConfigError,
+/// ModelError or std::invalid_argument.
+[[nodiscard]] std::unique_ptr<Segmenter> make_segmenter(
+    const MapperArguments& arguments, const ScanDataset& dataset,
+    const Eigen::Isometry3d& T_base_lidar = Eigen::Isometry3d::Identity());
 /// Lines that tell which model labels the scans, and whether another one was trained for lidars
 /// more like theirs; empty without a network.
 [[nodiscard]] std::string describe_model(const MapperArguments& arguments,

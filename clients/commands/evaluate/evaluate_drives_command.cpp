@@ -52,7 +52,7 @@ constexpr const char* drives_explanation =
     "path.\n"
     "Column 'wrong good': wrong poses called good; 'right lost': right ones called lost; ms: a "
     "scan\n"
-    "without the time for labels, map included.";
+    "without the time for labels, map included. --labels model takes the lidar to be upright.";
 
 /// Wrong labels: a share of the points at random, or all of a class.
 void spoil_labels(Scan& scan, const std::string& how, std::size_t index) {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "clients/commands/arguments/mapper_arguments.hpp"
+#include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/dataset/recording.hpp"
 #include "clients/commands/evaluate/segmentation_report.hpp"
@@ -59,6 +60,7 @@ struct EvaluateSegmentationArguments {
   std::vector<std::string> truth;
   std::string predictions, picture;
   MapperArguments mapper;
+  MountArguments mount;
   ScanRange range;
   bool json = false;
 };
@@ -129,7 +131,9 @@ SequenceScore run_model(const EvaluateSegmentationArguments& arguments, std::siz
   const ScanDataset dataset(sequence);
   require_semantic_kitti_labels(dataset);
   const std::size_t scans = arguments.range.end(dataset) - arguments.range.first;
-  const std::unique_ptr<Segmenter> labels = make_segmenter(arguments.mapper, dataset);
+  const std::unique_ptr<Segmenter> labels =
+      make_segmenter(arguments.mapper, dataset,
+                     arguments.mount.T_base_lidar().value_or(Eigen::Isometry3d::Identity()));
   Progress progress("segment " + sequence, "scans", scans);
   const SegmentationResult result =
       segment_dataset(dataset, arguments.range, *labels, [&](std::size_t seen) {
@@ -146,6 +150,8 @@ SequenceScore run_model(const EvaluateSegmentationArguments& arguments, std::siz
 
 ExitCode run(const EvaluateSegmentationArguments& arguments) {
   std::vector<SequenceScore> sequences;
+  if (!arguments.predictions.empty() && !arguments.mount.xyz_rpy.empty())
+    throw std::invalid_argument("--mount is for a model that runs, not for --predictions");
   if (arguments.predictions.empty()) {
     for (std::size_t number = 0; number < arguments.truth.size(); ++number) {
       sequences.push_back(run_model(arguments, number));
@@ -184,6 +190,9 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
       .option("--sensor", arguments->mapper.sensor,
               "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the data set suggests")
       .excludes(predictions);
+  add_mount_option(
+      command, arguments->mount,
+      "How the lidar leans, and its height above the ground; default: upright, not known");
   add_segmentation_options(command, arguments->mapper);
   command.option("--start", arguments->range.first, "Number of the first scan, or prediction");
   command.option("--scans,--count", arguments->range.count, "Take as many scans at most");
@@ -197,6 +206,7 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
       "  stillmap evaluate segmentation --truth sequences/08 --predictions my_net/08\n"
       "  stillmap evaluate segmentation --truth city --picture city.png\n"
       "  stillmap evaluate segmentation --model kitti --truth sequences/05 sequences/10\n"
+      "  stillmap evaluate segmentation --truth tilted --mount 1.2,0,1.4,0,15,0\n"
       "Predictions pair with the truth by name, and every one needs its truth; scans without a\n"
       "prediction do not count. A model gets scans as they were recorded, points that a server "
       "would\n"

@@ -89,8 +89,8 @@ class LocalizationRun {
       : dataset_(dataset),
         localizer_(localizer),
         config_(mapper_config(arguments.mapper, dataset.suggested_sensor())),
-        segmenter_(make_segmenter(labels_of(arguments.mapper, dataset), dataset)),
         T_body_lidar_(body_of(arguments.mount, arguments.mapper.config_file).T_body_lidar),
+        segmenter_(make_segmenter(labels_of(arguments.mapper, dataset), dataset, T_body_lidar_)),
         is_strict_(arguments.range.strict) {}
 
   /// Nothing for a scan that cannot be read; why is said.
@@ -121,8 +121,8 @@ class LocalizationRun {
   const ScanDataset& dataset_;
   const Localizer& localizer_;
   MapperConfig config_;
-  std::unique_ptr<Segmenter> segmenter_;
   Eigen::Isometry3d T_body_lidar_;
+  std::unique_ptr<Segmenter> segmenter_;
   bool is_strict_;
   std::size_t skipped_ = 0;
 };

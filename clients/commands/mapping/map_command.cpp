@@ -375,7 +375,7 @@ ExitCode run(const MapArguments& arguments) {
   static_cast<void>(denied_loops(arguments, dataset));
   static_cast<void>(gnss_options(arguments, dataset, body));
   const std::optional<Trajectory> truth = usable_truth(dataset);
-  auto labels = make_segmenter(arguments.mapper, dataset);
+  auto labels = make_segmenter(arguments.mapper, dataset, body.T_body_lidar);
   const std::unique_ptr<const EarlierMap> earlier = earlier_map(arguments, config);
   std::cerr << describe_model(arguments.mapper, dataset, *labels);
   // Nothing above touched the folder.
