@@ -151,7 +151,11 @@ void add_server_options(CLI::App& program, ServerArguments& server) {
       .add_option("--security", server.security,
                   "Folder of the server's identity in a secured domain, instead of the file's")
       ->envname("STILLMAP_SECURITY");
-  program.add_option("--map-file", server.map_file, "Where the map is kept, instead of the file's");
+  program.add_option("--map-file", server.map_file, "Where the map is kept, instead of the file's")
+      ->check([](const std::string& name) {
+        // As of a variable that is not set: who names a file wants the map kept.
+        return name.empty() ? "is empty; name a file, or leave the option out" : std::string();
+      });
   add_choice<DeliveryMode>(program, "--delivery", server.delivery,
                            {{"latest", DeliveryMode::latest}, {"every", DeliveryMode::every}},
                            "latest: drop scans that are too many; every: let the sender wait");

@@ -235,6 +235,12 @@ TEST(Startup, RefusesWhatCannotWorkWithAnExitCode) {
   ServerProcess wrong_option({"--no-such-option"});
   EXPECT_EQ(wrong_option.wait_for_exit(patience), 2);
 
+  // As of a variable that is not set.
+  ServerProcess no_name({"--map-file", "", "--domain", "231"});
+  EXPECT_EQ(no_name.wait_for_exit(patience), 2);
+  ServerProcess no_name_either({"--map-file=", "--domain", "231"});
+  EXPECT_EQ(no_name_either.wait_for_exit(patience), 2);
+
   std::ofstream(folder / "text.stillmap") << "this is no database, and must stay as it is";
   ServerProcess wrong_file({"--map-file", (folder / "text.stillmap").string(), "--domain", "231"});
   EXPECT_EQ(wrong_file.wait_for_exit(patience), 2);
