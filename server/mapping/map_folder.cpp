@@ -64,7 +64,7 @@ fs::path MapFolder::file_named(const std::string& name) const {
     throw std::invalid_argument("file '" + name + "' " + fault);
   const fs::path file = folder_ / name;
   std::error_code error;
-  if (fs::weakly_canonical(file, error).parent_path() != fs::weakly_canonical(folder_, error)) {
+  if (real_file(file).parent_path() != fs::weakly_canonical(folder_, error)) {
     throw std::invalid_argument("file '" + name + "' is a link that leads out of " +
                                 folder_.string() + "; it must be a plain name of a file there");
   }

@@ -254,6 +254,17 @@ TEST(Startup, RefusesWhatCannotWorkWithAnExitCode) {
       {"--map-file", (folder / "no/city.stillmap").string(), "--domain", "231"});
   EXPECT_EQ(no_folder.wait_for_exit(patience), 1);
 
+  std::filesystem::create_symlink(folder / "disk/city.stillmap", folder / "link.stillmap");
+  std::filesystem::create_symlink("round.stillmap", folder / "round.stillmap");
+  for (const auto& [name, code, why] : {std::tuple("link.stillmap", 1, "is the disk mounted"),
+                                        std::tuple("round.stillmap", 2, "leads to no file")}) {
+    testing::internal::CaptureStderr();
+    ServerProcess linked({"--map-file", (folder / name).string(), "--domain", "231"});
+    EXPECT_EQ(linked.wait_for_exit(patience), code) << name;
+    EXPECT_THAT(testing::internal::GetCapturedStderr(), testing::HasSubstr(why));
+    EXPECT_TRUE(std::filesystem::is_symlink(folder / name)) << name;
+  }
+
   ServerProcess help({"--help"});
   EXPECT_EQ(help.wait_for_exit(patience), 0);
 }

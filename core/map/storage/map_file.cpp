@@ -33,6 +33,26 @@ MapFileError unreadable(const fs::path& file, const std::runtime_error& error) {
                     "); restore a copy or name another file"};
 }
 
+/// The name that links lead to, whether or not a file has it: a file that is made there would
+/// otherwise take the link's place.
+fs::path end_of_links(const fs::path& file) {
+  // As many as Linux follows.
+  constexpr int max_links = 40;
+  fs::path name = fs::absolute(file);
+  std::error_code not_there;
+  for (int links = 0; fs::is_symlink(fs::symlink_status(name, not_there)); ++links) {
+    if (links == max_links) {
+      throw UnusableMapFileError(file,
+                                 "is a link that leads to no file, but to another link and "
+                                 "so on; name a file");
+    }
+    const fs::path target = fs::read_symlink(name, not_there);
+    if (not_there) return name;
+    name = name.parent_path() / target;
+  }
+  return name;
+}
+
 std::shared_ptr<const TemporaryFolder> scratch_folder() {
   const fs::path prefix = fs::temp_directory_path() / "stillmap-";
   try {
@@ -358,9 +378,15 @@ SavedMap to_saved_map(const MapCheckpoint& checkpoint) {
 
 fs::path real_file(const fs::path& file) {
   std::error_code unknown;
-  const fs::path real = fs::weakly_canonical(fs::absolute(file), unknown);
+  const fs::path target = end_of_links(file);
+  const bool is_link = target != fs::absolute(file);
+  if (is_link && !fs::exists(target.parent_path(), unknown) && !unknown) {
+    throw MapFileError(file, "is a link to " + target.string() +
+                                 ", whose folder is not there; is the disk mounted?");
+  }
+  const fs::path real = fs::weakly_canonical(target, unknown);
   // What cannot be resolved cannot be opened either, and that has better words for it.
-  return unknown ? fs::absolute(file) : real;
+  return unknown ? target : real;
 }
 
 std::unique_ptr<MapStore> open_map_file(const fs::path& file) {

@@ -102,7 +102,8 @@ class MapStore {
   virtual void copy_to(const std::filesystem::path& file) = 0;
 };
 
-/// The file itself, absolute, where a name is a link: its log and its lock lie beside that.
+/// The file itself, absolute, where a name is a link, also to one that is not there yet: its log
+/// and its lock lie beside that. Throws MapFileError for a link that leads to no file in a folder.
 [[nodiscard]] std::filesystem::path real_file(const std::filesystem::path& file);
 
 /// Opens or makes an SQLite map file (WAL; the file alone is complete after each save and may be
