@@ -339,8 +339,10 @@ void MappingThread::map(QueuedScan queued) {
   imu_report_.update(mapper_.inertial());
   imu_report_.tell(mapper_.levelling());
   const bool unlabelled = mapped->labelled.labels.empty();
-  latest_map_.add_pose({stamp_ns, T_map_base(mapped->odometry)}, mapped->odometry.health,
-                       unlabelled ? "none" : mapper_.label_source(), mapped->odometry.map_entry);
+  const bool is_set_back = latest_map_.add_pose(
+      {stamp_ns, T_map_base(mapped->odometry)}, mapped->odometry.health,
+      unlabelled ? "none" : mapper_.label_source(), mapped->odometry.map_entry);
+  if (is_set_back) tell_of_set_clock(stamp_ns);
   if (outputs_.place_finder != nullptr)
     outputs_.place_finder->update(stamp_ns, mapped->odometry, mapper_);
   if (mapped->odometry.is_beyond_limits) statistics_.count("poses_beyond_motion_limits");
@@ -349,6 +351,14 @@ void MappingThread::map(QueuedScan queued) {
   statistics_.add_latency("total", milliseconds(Clock::now() - queued.received));
   forward(*std::move(mapped));
   statistics_.record_other_stages(milliseconds(Clock::now() - began) - labels_ms_);
+}
+
+void MappingThread::tell_of_set_clock(std::int64_t stamp_ns) {
+  statistics_.count("clock_set_back");
+  spdlog::warn(
+      "the clock of the scans was set back, to {} ns: the path until then stays, and goes on from "
+      "here as a stretch of its own",
+      stamp_ns);
 }
 
 void MappingThread::drop(const ScanRejection& rejection) {

@@ -172,6 +172,7 @@ class MappingThread : public CheckpointSource {
   [[nodiscard]] Eigen::Isometry3d T_map_base(const OdometryResult& odometry) const {
     return odometry.T_map_lidar * frames_.T_base_lidar().inverse();
   }
+  void tell_of_set_clock(std::int64_t stamp_ns);
   void drop(const ScanRejection& rejection);
   void publish_snapshot();
   /// The tiles that meet the box, and where those are stored that are not in memory.

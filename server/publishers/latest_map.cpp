@@ -22,7 +22,7 @@ void LatestMap::begin(std::shared_ptr<const MapSnapshot> view, SharedTrajectory 
   published_at_ = std::chrono::steady_clock::now();
   changed_.notify_all();
   trajectory_ = std::move(trajectory);
-  session_begin_ = trajectory_.size();
+  stretch_begin_ = trajectory_.size();
   waiting_begin_.reset();
   newest_ = trajectory_.empty() ? StampedPose{} : trajectory_.back();
   health_ = OdometryHealth::initialised;
@@ -34,7 +34,7 @@ void LatestMap::correct(const MapCorrection& correction, std::shared_ptr<const M
   const SharedTrajectory before = corrected;
   const std::size_t begin = [this] {
     const std::scoped_lock lock(mutex_);
-    return session_begin_;
+    return stretch_begin_;
   }();
   corrected.truncate(begin);
   for (std::size_t i = begin; i < before.size(); ++i) {
@@ -63,7 +63,7 @@ void LatestMap::publish(std::shared_ptr<const MapSnapshot> view) {
   changed_.notify_all();
 }
 
-void LatestMap::add_pose(const StampedPose& pose, OdometryHealth health,
+bool LatestMap::add_pose(const StampedPose& pose, OdometryHealth health,
                          const std::string& label_source, MapEntry entry) {
   const std::scoped_lock lock(mutex_);
   ++poses_added_;
@@ -74,15 +74,16 @@ void LatestMap::add_pose(const StampedPose& pose, OdometryHealth health,
   if (is_denied || is_confirmed(entry)) {
     const auto waiting = std::exchange(waiting_begin_, std::nullopt);
     if (waiting && entry != MapEntry::enters_with_waiting) trajectory_.truncate(*waiting);
+    stretch_begin_ = std::min(stretch_begin_, trajectory_.size());
   }
   // A pose that nothing confirmed is no part of the path, nor of its file.
-  if (health == OdometryHealth::lost || is_denied) return;
-  std::size_t kept = trajectory_.size();
-  while (kept > session_begin_ && trajectory_[kept - 1].stamp_ns >= pose.stamp_ns) --kept;
-  trajectory_.truncate(kept);
-  if (waiting_begin_ && *waiting_begin_ > kept) waiting_begin_.reset();
-  if (entry == MapEntry::waits && !waiting_begin_) waiting_begin_ = kept;
+  if (health == OdometryHealth::lost || is_denied) return false;
+  const std::size_t end = trajectory_.size();
+  const bool is_set_back = end > stretch_begin_ && trajectory_.back().stamp_ns >= pose.stamp_ns;
+  if (is_set_back) stretch_begin_ = end;
+  if (entry == MapEntry::waits && !waiting_begin_) waiting_begin_ = end;
   trajectory_.push_back(pose);
+  return is_set_back;
 }
 
 std::shared_ptr<const MapSnapshot> LatestMap::view() const {

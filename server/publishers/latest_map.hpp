@@ -16,8 +16,9 @@
 
 namespace stillmap::server {
 
-/// The newest stamp of a map's poses and of its voxels in memory: a clock that was set back took
-/// poses away, but no voxels. Nothing without poses. Takes time in proportion to both.
+/// The newest stamp of a map's poses and of its voxels in memory: lost poses and those of earlier
+/// versions, where a clock that was set back took poses away, left voxels. Nothing without poses.
+/// Takes time in proportion to both.
 [[nodiscard]] std::optional<std::int64_t> seen_until_ns(const MapSnapshot& view,
                                                         const SharedTrajectory& path);
 
@@ -29,13 +30,14 @@ class LatestMap {
   /// run follow them as a session of their own, whatever their stamps.
   void begin(std::shared_ptr<const MapSnapshot> view, SharedTrajectory trajectory);
   void publish(std::shared_ptr<const MapSnapshot> view);
-  /// Removes poses of this session with the same or later stamps first: a clock that was set back
-  /// replaces what it said. A lost pose changes health and label source alone. Poses that `entry`
-  /// shows to be wrong, and those that waited for it, are no part of the path.
-  void add_pose(const StampedPose& pose, OdometryHealth health, const std::string& label_source,
+  /// True where its stamp is not after the last one's of this run: the clock was set back. The
+  /// poses until then stay, as their voxels do, and a new stretch of the path begins, as with a new
+  /// run. A lost pose changes health and label source alone. Poses that `entry` shows to be wrong,
+  /// and those that waited for it, are no part of the path.
+  bool add_pose(const StampedPose& pose, OdometryHealth health, const std::string& label_source,
                 MapEntry entry = MapEntry::enters);
 
-  /// The poses of this session were wrong by that; published with the view that it led to.
+  /// The poses of this stretch were wrong by that; published with the view that it led to.
   void correct(const MapCorrection& correction, std::shared_ptr<const MapSnapshot> view);
 
   /// Never null once `begin` was called.
@@ -81,8 +83,9 @@ class LatestMap {
   MapState state_;
   std::chrono::steady_clock::time_point published_at_;
   SharedTrajectory trajectory_;
-  /// Where the poses of this session begin in it.
-  std::size_t session_begin_ = 0;
+  /// Where the poses of this run begin in it, or those since its clock was set back: their stamps
+  /// rise.
+  std::size_t stretch_begin_ = 0;
   /// Where those begin in it that wait until a later one shows whether they are right.
   std::optional<std::size_t> waiting_begin_;
   StampedPose newest_;

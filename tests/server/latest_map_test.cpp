@@ -36,11 +36,26 @@ TEST(LatestMap, KeepsThePathOfEarlierRunsWhateverTheClockSays) {
   add(latest_map, 2);
   add(latest_map, 4);
   EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{10, 20, 30, 2, 4}));
-  // A clock that is set back replaces what it said in this run.
-  add(latest_map, 3);
-  EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{10, 20, 30, 2, 3}));
-  add(latest_map, 1);
-  EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{10, 20, 30, 1}));
+}
+
+TEST(LatestMap, KeepsThePathUntilTheClockWasSetBack) {
+  LatestMap latest_map;
+  latest_map.begin(std::make_shared<const MapSnapshot>(), {{.stamp_ns = 10}});
+  const auto add_is_set_back = [&](std::int64_t stamp_ns, MapEntry entry = MapEntry::enters) {
+    return latest_map.add_pose({.stamp_ns = stamp_ns}, OdometryHealth::good, "stream", entry);
+  };
+  EXPECT_FALSE(add_is_set_back(2)) << "another run's clock is not this one's";
+  EXPECT_FALSE(add_is_set_back(4));
+  EXPECT_TRUE(add_is_set_back(3));
+  EXPECT_FALSE(add_is_set_back(5));
+  EXPECT_TRUE(add_is_set_back(1));
+  EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{10, 2, 4, 3, 5, 1}));
+  // What waited before and after is denied.
+  EXPECT_FALSE(add_is_set_back(7, MapEntry::waits));
+  EXPECT_TRUE(add_is_set_back(6, MapEntry::waits));
+  EXPECT_FALSE(add_is_set_back(8, MapEntry::stays_out_with_waiting));
+  EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{10, 2, 4, 3, 5, 1}));
+  EXPECT_FALSE(add_is_set_back(9));
 }
 
 TEST(LatestMap, TellsUntilWhenItWasSeenWhateverTheClockSays) {
@@ -50,7 +65,7 @@ TEST(LatestMap, TellsUntilWhenItWasSeenWhateverTheClockSays) {
   latest_map.begin(std::make_shared<const MapSnapshot>(), {{.stamp_ns = 30}, {.stamp_ns = 10}});
   add(latest_map, 20);
   EXPECT_EQ(latest_map.seen_until_ns(), 30);
-  // Poses were taken away by a clock that was set back, but not what was seen from them.
+  // Poses that are no part of the path left what was seen from them.
   const VoxelGrid grid(0.2, 20.0);
   Voxel voxel;
   voxel.point_count = 1;
@@ -80,6 +95,19 @@ TEST(LatestMap, CorrectsThePosesOfThisSessionAlone) {
   for (std::size_t i = 0; i < 3; ++i) EXPECT_TRUE(path[i].T_map_lidar.translation().isZero()) << i;
   EXPECT_EQ(path[3].T_map_lidar.translation(), Eigen::Vector3d(1, 2, 3));
   EXPECT_EQ(latest_map.newest_pose().T_map_lidar.translation(), Eigen::Vector3d(1, 2, 3));
+}
+
+TEST(LatestMap, CorrectsNoPoseOfBeforeTheClockWasSetBack) {
+  LatestMap latest_map;
+  latest_map.begin(std::make_shared<const MapSnapshot>(), {});
+  for (const std::int64_t stamp_ns : {20, 30, 10, 25}) add(latest_map, stamp_ns);
+  const MapCorrection correction(
+      {{15, Eigen::Vector3d::Zero(), Eigen::Isometry3d(Eigen::Translation3d(1, 2, 3))}});
+  latest_map.correct(correction, std::make_shared<const MapSnapshot>());
+  const SharedTrajectory path = latest_map.trajectory();
+  ASSERT_EQ(path.size(), 4U);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_TRUE(path[i].T_map_lidar.translation().isZero()) << i;
+  EXPECT_EQ(path[3].T_map_lidar.translation(), Eigen::Vector3d(1, 2, 3));
 }
 
 TEST(LatestMap, KeepsLostPosesOutOfThePath) {

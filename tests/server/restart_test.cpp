@@ -130,6 +130,47 @@ TEST(Restart, AnEarlierClockNeitherDeletesThePathNorMisplacesTheMap) {
   }
 }
 
+// As when NTP sets a clock that ran ahead: voxels stay, and so does the path that led to them.
+TEST(Restart, AClockThatIsSetBackInARunDeletesNothing) {
+  const ServiceSetup setup("every");
+  const std::int64_t day_ns = 86'400'000'000'000;
+  {
+    ServerProcess server(setup.server_arguments());
+    Client client(setup.client());
+    client.wait_for_server(patience);
+    ScanPublisher publisher(setup.publisher(true));
+    drive(publisher, 0, 10);
+    drive_at(publisher, 10, 40, -day_ns);
+    ASSERT_TRUE(wait_for_scans(client, 40));
+    const dds::ServerStatus status = client.status();
+    EXPECT_EQ(status.counter("clock_set_back"), 1U);
+    EXPECT_EQ(status.counter("scans_mapped") + status.dropped(), 40U);
+    terminate(server, client);
+  }
+  const SavedMap stored = open_map_file(setup.map_file())->load();
+  ASSERT_GT(stored.trajectory.size(), 20U) << "some scans make the mapper believe the clock";
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_EQ(stored.trajectory[static_cast<std::size_t>(i)].stamp_ns, room_scan(i).stamp_ns);
+  }
+  EXPECT_EQ(stored.trajectory.back().stamp_ns, room_scan(39).stamp_ns - day_ns);
+  // And the next run goes on where this one ended.
+  {
+    ServerProcess server(setup.server_arguments());
+    Client client(setup.client());
+    client.wait_for_server(patience);
+    ScanPublisher publisher(setup.publisher(true));
+    drive_at(publisher, 40, 43, -day_ns);
+    ASSERT_TRUE(wait_for_scans(client, 3));
+    terminate(server, client);
+  }
+  const SavedMap longer = open_map_file(setup.map_file())->load();
+  ASSERT_EQ(longer.trajectory.size(), stored.trajectory.size() + 3);
+  const Eigen::Isometry3d T_map_room =
+      longer.trajectory.front().T_map_lidar * room_pose(0).T_map_lidar.inverse();
+  const Eigen::Vector3d expected = T_map_room * room_pose(42).T_map_lidar.translation();
+  EXPECT_LT((longer.trajectory.back().T_map_lidar.translation() - expected).norm(), 0.3);
+}
+
 TEST(Restart, SighupSavesTheMapAsSigtermDoes) {
   const ServiceSetup setup("every");
   run_server(setup, 0, 8, [](ServerProcess& server, Client&) {
