@@ -31,7 +31,8 @@ constexpr const char* no_map_yet = "holds no map yet; name a file that a map was
 std::unique_ptr<MapStore> open_existing(const fs::path& file) {
   std::error_code error;
   if (!fs::exists(file, error)) {
-    throw MapFileError(file, "is not there; it must lie beside the configured map file");
+    throw MapFileError(file, "is not there; a map to be loaded must lie in the folder " +
+                                 file.parent_path().string());
   }
   if (fs::is_regular_file(file, error) && fs::file_size(file, error) == 0) {
     throw MapFileError(file, no_map_yet);
@@ -251,6 +252,7 @@ fs::path MapSaver::save_as(const std::string& name, bool overwrite) {
   }
   if ((store_ || !file_.empty()) && !is_saved_whole()) save(CheckpointScope::changed);
   if (target != file_) save_copy(target, overwrite);
+  if (file_.empty()) copied_map_id_ = latest_map_.view()->map_id;
   return target;
 }
 
@@ -275,11 +277,19 @@ void MapSaver::save_copy(const fs::path& target, bool overwrite) {
   scratch->copy_to(target);
 }
 
+void MapSaver::refuse_to_lose() const {
+  if (!file_.empty() || is_empty() || copied_map_id_ == latest_map_.view()->map_id) return;
+  throw std::invalid_argument(
+      "this server keeps its map in no file, and a load would lose it: 'stillmap save NAME' first "
+      "('stillmap reset --discard' where it is not wanted)");
+}
+
 fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepare) {
   const std::scoped_lock lock(mutex_);
   // It belongs under the name that the saver is about to leave.
   if (misplaced_) bring_back();
   fs::path target = file_named(name);
+  refuse_to_lose();
   const bool is_own = target == file_;
   auto target_lock = is_own ? nullptr : std::make_unique<MapLock>(target);
   auto store = is_own ? nullptr : open_existing(target);

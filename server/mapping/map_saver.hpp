@@ -162,8 +162,8 @@ class MapSaver {
   /// Makes `name` the current file: reads and prepares the map there under a new id, saves the
   /// running map to its own file, and lets the other one take its place. An empty name or that of
   /// the current file returns to the last save. Throws as save_as, also for a file that does not
-  /// exist, cannot be written or holds no map, and what `prepare` throws; then the running map goes
-  /// on, and its file stays its own.
+  /// exist, cannot be written or holds no map, for a running map that has no file and was never
+  /// saved, and what `prepare` throws; then the running map goes on, and its file stays its own.
   std::filesystem::path resume_from(const std::string& name, const PrepareMap& prepare);
 
   /// Lets an empty map begin. The running map is saved, and kept beside the current file, which is
@@ -190,6 +190,8 @@ class MapSaver {
   [[nodiscard]] std::filesystem::path file_named(const std::string& name) const;
   void save_copy(const std::filesystem::path& target, bool overwrite);
   [[nodiscard]] bool is_empty() const;
+  /// A map without a file that was never saved. Throws std::invalid_argument.
+  void refuse_to_lose() const;
   /// Renames the current file, and puts an empty one in its place, whose tiles it returns. Throws
   /// MapFileError; then the current file is what it was, or becomes it again with the next use that
   /// the disk allows.
@@ -220,6 +222,8 @@ class MapSaver {
   std::shared_ptr<MovableTileStore> tiles_;
   /// Where the current file lies while it could not be given its name again.
   std::optional<std::filesystem::path> misplaced_;
+  /// The map without a file that was saved under a name last.
+  std::uint64_t copied_map_id_ = 0;
   std::uint64_t saved_map_id_ = 0;
   std::uint64_t saved_version_ = 0;
   std::uint64_t saved_poses_ = 0;
