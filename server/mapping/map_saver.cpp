@@ -69,6 +69,7 @@ MapSaver::MapSaver(const LatestMap& latest_map, Statistics& statistics, const fs
 
 MapStore& MapSaver::open_store() {
   if (misplaced_) bring_back();
+  look_after_file();
   if (store_) return *store_;
   auto store = open_map_file(file_);
   // What the run changes from here on is another session.
@@ -124,6 +125,7 @@ void MapSaver::set_source(CheckpointSource& source) {
 
 void MapSaver::save_if_changed() {
   const std::scoped_lock lock(mutex_);
+  look_after_file();
   if ((!store_ && file_.empty()) || is_saved()) return;
   // A temporary file is only there to make room in memory.
   if (file_.empty() && source_->memory_use().bytes < memory_limit_bytes_ / 2) return;
@@ -133,6 +135,7 @@ void MapSaver::save_if_changed() {
 void MapSaver::save_at_end() {
   const std::scoped_lock lock(mutex_);
   if (misplaced_) bring_back();
+  look_after_file();
   // Nothing mapped: an empty map must not replace what the file holds.
   const bool is_map_empty = latest_map_.poses_added() == 0 && latest_map_.view()->tiles.empty();
   if (!file_.empty() && !(is_map_empty && is_saved())) save(CheckpointScope::changed, true);
@@ -178,6 +181,9 @@ void MapSaver::save(CheckpointScope scope, bool has_ended) {
   const auto began = std::chrono::steady_clock::now();
   try {
     if (!store(scope, has_ended)) return;
+    // Somebody may have put another file there meanwhile.
+    look_after_file();
+    if (saved_map_id_ == 0) store(CheckpointScope::everything, has_ended);
   } catch (const std::exception& error) {
     statistics_.map_save_failed(error.what());
     source_->checkpoint_failed();
@@ -209,6 +215,11 @@ bool MapSaver::store(CheckpointScope scope, bool has_ended) {
   checkpoint.map.is_partial = scope == CheckpointScope::changed_views;
   if (checkpoint.map.is_partial && checkpoint.map.tile_evidence.empty()) return false;
   if (has_ended) checkpoint.map.metadata[map_ended_key] = "yes";
+  leave_out_lost_tiles(checkpoint.map);
+  // Since the begin, the mapper was waited for.
+  if (file.fate() == MapFileFate::overwritten) {
+    throw MapFileError(file_, "was overwritten just now; nothing was written to it");
+  }
   const std::uint64_t bytes = file.save(checkpoint.map);
   source_->checkpoint_stored(checkpoint.step);
   remember_as_saved(checkpoint.map.view, poses);
@@ -246,6 +257,7 @@ bool MapSaver::is_empty() const {
 
 fs::path MapSaver::save_as(const std::string& name, bool overwrite) {
   const std::scoped_lock lock(mutex_);
+  look_after_file();
   fs::path target = file_named(name);
   if (is_empty()) {
     throw std::invalid_argument("the map is empty: no scan was mapped yet; nothing is saved");
@@ -271,7 +283,14 @@ void MapSaver::save_copy(const fs::path& target, bool overwrite) {
   std::error_code unknown;
   const std::uintmax_t bytes = file_.empty() ? 0 : fs::file_size(file_, unknown);
   folder_.check_room(file_, target, unknown ? 0 : bytes);
-  if (store_ || !file_.empty()) return open_store().copy_to(target);
+  if (store_ || !file_.empty()) {
+    MapStore& store = open_store();
+    store.copy_to(target);
+    if (!file_.empty() && store.fate() == MapFileFate::overwritten) {
+      throw MapFileError(file_, "was overwritten while it was copied; save again");
+    }
+    return;
+  }
   const std::unique_ptr<MapStore> scratch = open_scratch_map();
   scratch->save(take(CheckpointScope::everything).map);
   scratch->copy_to(target);
@@ -288,7 +307,8 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
   const std::scoped_lock lock(mutex_);
   // It belongs under the name that the saver is about to leave.
   if (misplaced_) bring_back();
-  fs::path target = file_named(name);
+  look_after_file();
+  fs::path target = name.empty() && left_file_ ? *left_file_ : file_named(name);
   refuse_to_lose();
   const bool is_own = target == file_;
   auto target_lock = is_own ? nullptr : std::make_unique<MapLock>(target);
@@ -315,6 +335,9 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
     store_ = std::move(store);
     lock_ = std::move(target_lock);
   }
+  left_file_.reset();
+  lost_tiles_.clear();
+  is_memory_alone_ = false;
   remember_metadata(map);
   remember_as_saved(*latest_map_.view(), latest_map_.poses_added());
   is_partial_ = false;
@@ -346,6 +369,8 @@ NewMap MapSaver::begin_anew(bool discard, const BeginMap& begin) {
   tiles_ = tiles;
   is_session_ = false;
   saved_map_id_ = 0;
+  lost_tiles_.clear();
+  is_memory_alone_ = false;
   stored_metadata_.clear();
   if (discard && !begun.kept_file.empty()) {
     std::error_code not_removed;

@@ -11,6 +11,7 @@
 #include <optional>
 #include <shared_mutex>
 #include <string>
+#include <vector>
 
 #include "core/map/storage/map_file.hpp"
 #include "core/map/storage/map_lock.hpp"
@@ -111,7 +112,9 @@ struct MapSaverLimits {
 };
 
 /// Writes the map to its file, and with a memory limit keeps there what is not in memory. A file
-/// never gets another map's content: a map that gives way to a new one keeps a file of its own.
+/// never gets another map's content: a map that gives way to a new one keeps a file of its own, and
+/// one whose file was removed, or another one put there, is written anew: under its name where that
+/// is free, else under one with the time.
 /// While the robot stands, checkpoints hold the tiles whose view changed by more than a few voxels;
 /// what else a standing lidar gathers (counts, times, poses) is written as far as the allowance
 /// goes. Thread-safe; saves wait for each other.
@@ -161,9 +164,10 @@ class MapSaver {
 
   /// Makes `name` the current file: reads and prepares the map there under a new id, saves the
   /// running map to its own file, and lets the other one take its place. An empty name or that of
-  /// the current file returns to the last save. Throws as save_as, also for a file that does not
-  /// exist, cannot be written or holds no map, for a running map that has no file and was never
-  /// saved, and what `prepare` throws; then the running map goes on, and its file stays its own.
+  /// the current file returns to the last save, or to what somebody put in the file's place. Throws
+  /// as save_as, also for a file that does not exist, cannot be written or holds no map, for a
+  /// running map that has no file and was never saved, and what `prepare` throws; then the running
+  /// map goes on, and its file stays its own.
   std::filesystem::path resume_from(const std::string& name, const PrepareMap& prepare);
 
   /// Lets an empty map begin. The running map is saved, and kept beside the current file, which is
@@ -171,8 +175,21 @@ class MapSaver {
   NewMap begin_anew(bool discard, const BeginMap& begin);
 
  private:
-  /// Opens it again where that failed before.
+  /// Opens it again where that failed before, and writes the map anew where its file was removed or
+  /// another one put there.
   [[nodiscard]] MapStore& open_store();
+  /// Throws MapFileError where the map cannot be written anew; it is tried again with the next use.
+  void look_after_file();
+  void write_anew(MapFileFate fate);
+  /// False where the name is another file's, or another server's.
+  [[nodiscard]] bool take_name_again();
+  /// Tiles that were in the file alone are lost with its content.
+  void write_anew_from_memory();
+  /// The next file to be opened is `target`; the one that was open is somebody else's.
+  void leave_store_for(const std::filesystem::path& target);
+  void leave_out_lost_tiles(SavedMap& map);
+  /// A map without a file that was never saved. Throws std::invalid_argument.
+  void refuse_to_lose() const;
   [[nodiscard]] SavedMap read(MapStore& store) const;
   /// All that a checkpoint in the present scope would store.
   [[nodiscard]] bool is_saved() const;
@@ -190,8 +207,6 @@ class MapSaver {
   [[nodiscard]] std::filesystem::path file_named(const std::string& name) const;
   void save_copy(const std::filesystem::path& target, bool overwrite);
   [[nodiscard]] bool is_empty() const;
-  /// A map without a file that was never saved. Throws std::invalid_argument.
-  void refuse_to_lose() const;
   /// Renames the current file, and puts an empty one in its place, whose tiles it returns. Throws
   /// MapFileError; then the current file is what it was, or becomes it again with the next use that
   /// the disk allows.
@@ -222,6 +237,12 @@ class MapSaver {
   std::shared_ptr<MovableTileStore> tiles_;
   /// Where the current file lies while it could not be given its name again.
   std::optional<std::filesystem::path> misplaced_;
+  /// The name that the running map had until somebody put another file there.
+  std::optional<std::filesystem::path> left_file_;
+  /// The file's content is gone, and nothing was saved since.
+  bool is_memory_alone_ = false;
+  std::vector<TileId> lost_tiles_;
+  ThrottledLog throttled_log_;
   /// The map without a file that was saved under a name last.
   std::uint64_t copied_map_id_ = 0;
   std::uint64_t saved_map_id_ = 0;

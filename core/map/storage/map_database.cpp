@@ -8,7 +8,9 @@
 #include <unistd.h>
 
 #include <cctype>
+#include <cerrno>
 #include <cstdint>
+#include <cstdio>
 #include <fstream>
 #include <string>
 #include <string_view>
@@ -327,6 +329,20 @@ void put_in_place(const fs::path& fresh, const fs::path& file) {
   for (const char* suffix : {"-wal", "-shm"}) fs::remove(beside(file, suffix));
   fs::rename(fresh, file);
   sync_folder(file);
+}
+
+bool put_in_free_place(const fs::path& fresh, const fs::path& file) {
+  if (::renameat2(AT_FDCWD, fresh.c_str(), AT_FDCWD, file.c_str(), RENAME_NOREPLACE) != 0) {
+    // Not every file system knows that; the others that do not know links either are refused.
+    const bool is_unknown = errno == EINVAL || errno == ENOSYS;
+    if (!is_unknown || ::link(fresh.c_str(), file.c_str()) != 0) {
+      if (errno == EEXIST) return false;
+      throw fs::filesystem_error("rename", fresh, file,
+                                 std::error_code(errno, std::generic_category()));
+    }
+  }
+  sync_folder(file);
+  return true;
 }
 
 }  // namespace stillmap

@@ -44,6 +44,10 @@ void check_shown_tables(SQLite::Database& database, const std::filesystem::path&
 /// a crash the old or the new one is there. Throws std::filesystem::filesystem_error.
 void put_in_place(const std::filesystem::path& fresh, const std::filesystem::path& file);
 
+/// The same for a name that no file has; false, and nothing done, where one has it by then.
+[[nodiscard]] bool put_in_free_place(const std::filesystem::path& fresh,
+                                     const std::filesystem::path& file);
+
 /// Whether the tables are those of the first schema, which stores only the voxels that tiles show.
 [[nodiscard]] bool has_first_schema(SQLite::Database& database);
 

@@ -17,6 +17,7 @@
 
 #include "core/map/storage/fresh_map_file.hpp"
 #include "core/map/storage/map_database.hpp"
+#include "core/map/storage/map_file_watch.hpp"
 #include "core/map/storage/map_tables.hpp"
 #include "core/map/storage/save_marks.hpp"
 #include "core/map/storage/session_tables.hpp"
@@ -125,7 +126,10 @@ class SqliteMapStore : public MapStore {
  public:
   explicit SqliteMapStore(const fs::path& file,
                           std::shared_ptr<const TemporaryFolder> folder = nullptr)
-      : folder_(std::move(folder)), file_(file), database_(open_map_database(file)) {}
+      : folder_(std::move(folder)),
+        file_(file),
+        database_(open_map_database(file)),
+        watch_(file, database_) {}
 
   std::uint64_t save(const SavedMap& map) override {
     std::uint64_t log_bytes = 0;
@@ -226,6 +230,23 @@ class SqliteMapStore : public MapStore {
     }
   }
 
+  bool copy_to_new(const fs::path& file) override {
+    try {
+      const FreshMapFile fresh(file);
+      back_up_to(fresh.path());
+      return put_in_free_place(fresh.path(), file);
+    } catch (const std::runtime_error& error) {
+      throw MapFileWriteError(file, std::string("cannot be written (") + error.what() + ")");
+    }
+  }
+
+  MapFileFate fate() override { return watch_.fate(database_); }
+
+  std::function<void()> abandon() override {
+    sqlite3_db_config(database_.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+    return watch_.log_removal();
+  }
+
  private:
   void back_up_to(const fs::path& fresh) {
     SQLite::Database target(sqlite_name(fresh), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
@@ -305,7 +326,12 @@ class SqliteMapStore : public MapStore {
 
   template <typename Action>
   void writing(Action action) {
+    struct Remembered {
+      ~Remembered() { store.watch_.remember(store.database_); }
+      SqliteMapStore& store;
+    };
     try {
+      const Remembered at_end{*this};
       action();
     } catch (const SQLite::Exception& error) {
       throw MapFileWriteError(file_, std::string("cannot be saved (") + error.what() +
@@ -353,6 +379,7 @@ class SqliteMapStore : public MapStore {
   std::shared_ptr<const TemporaryFolder> folder_;
   fs::path file_;
   SQLite::Database database_;
+  MapFileWatch watch_;
   /// What is stored, once it was read: a save looks at what differs from it.
   std::optional<SharedTrajectory> saved_trajectory_;
   std::optional<TileTable> saved_tiles_;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <stdexcept>
@@ -71,6 +72,17 @@ struct RunSession {
 /// A checkpoint as it is stored.
 [[nodiscard]] SavedMap to_saved_map(const MapCheckpoint& checkpoint);
 
+/// What became of an open map file's name and content, by the hand of somebody who took no lock.
+enum class MapFileFate : std::uint8_t {
+  kept,
+  /// No file has the name; the content is still there while the store is.
+  removed,
+  /// Another file has the name; as above.
+  replaced,
+  /// The file has another content, or one that cannot be read: it must not be written to.
+  overwritten
+};
+
 /// Storage of maps between runs. Hides the database.
 class MapStore {
  public:
@@ -100,6 +112,14 @@ class MapStore {
   /// Writes the last saved state to another file, which is replaced in one step. Throws
   /// MapFileError, and leaves that file as it was.
   virtual void copy_to(const std::filesystem::path& file) = 0;
+  /// The same to a name that no file has; false where one has it by then.
+  [[nodiscard]] virtual bool copy_to_new(const std::filesystem::path& file) = 0;
+  /// Costs some reads of single pages.
+  [[nodiscard]] virtual MapFileFate fate() = 0;
+  /// Before the store goes: what is in its log stays out of the file, which is somebody else's by
+  /// now. Returns what removes the log's files when no connection of this process has them open any
+  /// more, unless they are others by then.
+  [[nodiscard]] virtual std::function<void()> abandon() = 0;
 };
 
 /// The file itself, absolute, where a name is a link, also to one that is not there yet: its log

@@ -69,6 +69,13 @@ MapFileError not_a_lock(const fs::path& map_file, const fs::path& lock_file) {
                         " is something else than a lock; move that, or name another file"};
 }
 
+/// Whether the open file is the one of that name.
+bool has_name(int descriptor, const fs::path& name, struct stat& opened) {
+  struct stat named {};
+  return ::fstat(descriptor, &opened) == 0 && ::stat(name.c_str(), &named) == 0 &&
+         opened.st_dev == named.st_dev && opened.st_ino == named.st_ino;
+}
+
 /// Opens and locks it; -1 when it was removed meanwhile, by a holder that ended.
 int try_lock(const fs::path& lock_file, const fs::path& map_file) {
   const int descriptor = ::open(lock_file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
@@ -81,9 +88,7 @@ int try_lock(const fs::path& lock_file, const fs::path& map_file) {
     throw held_by(map_file, holder);
   }
   struct stat opened {};
-  struct stat named {};
-  const bool is_named = ::fstat(descriptor, &opened) == 0 &&
-                        ::stat(lock_file.c_str(), &named) == 0 && opened.st_ino == named.st_ino;
+  const bool is_named = has_name(descriptor, lock_file, opened);
   if (is_named && opened.st_size <= max_lock_bytes) return descriptor;
   ::close(descriptor);
   if (is_named) throw not_a_lock(map_file, lock_file);
@@ -110,9 +115,15 @@ MapLock::MapLock(const fs::path& map_file) : lock_file_(beside(real_file(map_fil
   throw not_lockable(map_file, why.c_str());
 }
 
+bool MapLock::is_held() const {
+  struct stat opened {};
+  return has_name(descriptor_, lock_file_, opened);
+}
+
 MapLock::~MapLock() {
   std::error_code ignored;
-  fs::remove(lock_file_, ignored);
+  // Another process may have made one there where this one was removed.
+  if (is_held()) fs::remove(lock_file_, ignored);
   ::close(descriptor_);
 }
 

@@ -14,6 +14,8 @@ class MapLock {
   /// something else.
   explicit MapLock(const std::filesystem::path& map_file);
   ~MapLock();
+  /// Whether its file still has its name: somebody may have removed it.
+  [[nodiscard]] bool is_held() const;
   MapLock(const MapLock&) = delete;
   MapLock& operator=(const MapLock&) = delete;
 

@@ -27,27 +27,6 @@ std::int64_t random_mark() {
   return static_cast<std::int64_t>(entropy()) << 32 | entropy();
 }
 
-/// In the order of the saves; none in a file that was saved before there were marks.
-std::vector<std::int64_t> marks(SQLite::Database& database) {
-  std::vector<std::int64_t> all;
-  if (!database.tableExists("saves")) return all;
-  SQLite::Statement row(database, "SELECT mark FROM saves ORDER BY rowid");
-  while (row.executeStep()) all.push_back(row.getColumn(0).getInt64());
-  return all;
-}
-
-/// Nothing where the file cannot be read without its log, as when a crash came while the log was
-/// written into it.
-std::optional<std::int64_t> last_mark_without_log(const fs::path& file) {
-  try {
-    SQLite::Database alone(uri_without_log(file), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
-    const std::vector<std::int64_t> all = marks(alone);
-    return all.empty() ? std::nullopt : std::make_optional(all.back());
-  } catch (const SQLite::Exception&) {
-    return std::nullopt;
-  }
-}
-
 bool is_sound_without_log(const fs::path& file) {
   try {
     SQLite::Database alone(uri_without_log(file), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
@@ -65,9 +44,11 @@ bool is_log_of(const fs::path& file) {
     // Busy where any process has the file open: then the log is in use.
     database.exec("PRAGMA locking_mode = EXCLUSIVE");
     static_cast<void>(database.tableExists("saves"));
-    const auto last = last_mark_without_log(file);
+    // Nothing where the file cannot be read without its log, as when a crash came while the log was
+    // written into it.
+    const auto last = last_mark_without_log(file).mark;
     if (!last) return true;
-    const std::vector<std::int64_t> with_log = marks(database);
+    const std::vector<std::int64_t> with_log = save_marks(database);
     return std::ranges::find(with_log, *last) != with_log.end();
   } catch (const SQLite::Exception& error) {
     const bool is_damaged =
@@ -86,6 +67,25 @@ void add_save_mark(SQLite::Database& database, bool log_was_empty) {
   SQLite::Statement insert(database, "INSERT INTO saves VALUES (?)");
   insert.bind(1, random_mark());
   insert.exec();
+}
+
+std::vector<std::int64_t> save_marks(SQLite::Database& database) {
+  std::vector<std::int64_t> all;
+  if (!database.tableExists("saves")) return all;
+  SQLite::Statement row(database, "SELECT mark FROM saves ORDER BY rowid");
+  while (row.executeStep()) all.push_back(row.getColumn(0).getInt64());
+  return all;
+}
+
+LastMark last_mark_without_log(const fs::path& file) {
+  try {
+    SQLite::Database alone(uri_without_log(file), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+    const std::vector<std::int64_t> all = save_marks(alone);
+    return {.is_readable = true,
+            .mark = all.empty() ? std::nullopt : std::make_optional(all.back())};
+  } catch (const SQLite::Exception&) {
+    return {};
+  }
 }
 
 void put_away_other_log(const fs::path& file) {

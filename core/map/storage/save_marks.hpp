@@ -2,7 +2,10 @@
 
 #include <SQLiteCpp/Database.h>
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
+#include <vector>
 
 namespace stillmap {
 
@@ -13,6 +16,19 @@ namespace stillmap {
 /// Adds a mark within the transaction that is open. `log_was_empty`: all earlier saves are in the
 /// file itself, so that marks before the last one are no longer needed.
 void add_save_mark(SQLite::Database& database, bool log_was_empty);
+
+/// In the order of the saves; none in a file that was saved before there were marks.
+[[nodiscard]] std::vector<std::int64_t> save_marks(SQLite::Database& database);
+
+/// What a file holds of its own, without its log.
+struct LastMark {
+  /// A map file without errors in what was read of it. False also while a log is being written into
+  /// it.
+  bool is_readable = false;
+  /// Nothing in one that was saved before there were marks.
+  std::optional<std::int64_t> mark;
+};
+[[nodiscard]] LastMark last_mark_without_log(const std::filesystem::path& file);
 
 /// Renames a log that is not this file's, so that the file is opened as it is alone; its name then
 /// ends in "-wal.other". Does nothing where a process has the file open. Throws

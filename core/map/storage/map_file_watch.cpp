@@ -1,0 +1,94 @@
+#include "core/map/storage/map_file_watch.hpp"
+
+#include <SQLiteCpp/Exception.h>
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <system_error>
+#include <utility>
+
+#include "core/map/storage/map_database.hpp"
+#include "core/map/storage/save_marks.hpp"
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_same_file(const std::optional<FileState>& one, const std::optional<FileState>& other) {
+  return one && other && one->device == other->device && one->number == other->number;
+}
+
+std::int64_t data_version(SQLite::Database& database) {
+  return database.execAndGet("PRAGMA data_version").getInt64();
+}
+
+/// Whether the name was given to another file since the connection opened it.
+bool has_moved(SQLite::Database& database) {
+  int moved = 0;
+  const int result =
+      sqlite3_file_control(database.getHandle(), "main", SQLITE_FCNTL_HAS_MOVED, &moved);
+  return result == SQLITE_OK && moved != 0;
+}
+
+}  // namespace
+
+MapFileWatch::MapFileWatch(fs::path file, SQLite::Database& database)
+    : file_(std::move(file)), opened_(FileState::of(file_)) {
+  if (has_moved(database)) opened_.reset();
+  remember(database);
+}
+
+void MapFileWatch::remember(SQLite::Database& database) {
+  try {
+    marks_ = save_marks(database);
+    data_version_ = data_version(database);
+  } catch (const SQLite::Exception&) {
+    // A failing disk; who reads or writes next says so.
+    marks_.reset();
+  }
+  if (!log_) log_ = FileState::of(beside(file_, "-wal"));
+  if (!log_index_) log_index_ = FileState::of(beside(file_, "-shm"));
+}
+
+MapFileFate MapFileWatch::fate(SQLite::Database& database) {
+  const auto named = FileState::of(file_);
+  if (!named) return MapFileFate::removed;
+  if (!is_same_file(named, opened_)) return MapFileFate::replaced;
+  try {
+    // Another connection has saved there.
+    if (data_version(database) != data_version_) remember(database);
+  } catch (const SQLite::Exception&) {
+    return MapFileFate::overwritten;
+  }
+  return is_own_content() ? MapFileFate::kept : MapFileFate::overwritten;
+}
+
+bool MapFileWatch::is_own_content() const {
+  if (!marks_) return true;
+  const LastMark last = last_mark_without_log(file_);
+  if (has_empty_log()) {
+    const auto own = marks_->empty() ? std::nullopt : std::make_optional(marks_->back());
+    return last.is_readable && last.mark == own;
+  }
+  // A log may be written into the file in parts, while somebody reads it.
+  return !last.mark || std::ranges::find(*marks_, *last.mark) != marks_->end();
+}
+
+bool MapFileWatch::has_empty_log() const {
+  std::error_code none_there;
+  const std::uintmax_t bytes = fs::file_size(beside(file_, "-wal"), none_there);
+  return none_there || bytes == 0;
+}
+
+std::function<void()> MapFileWatch::log_removal() const {
+  return [file = file_, log = log_, index = log_index_] {
+    std::error_code ignored;
+    for (const auto& [suffix, own] : {std::pair("-wal", log), std::pair("-shm", index)}) {
+      const fs::path name = beside(file, suffix);
+      if (is_same_file(FileState::of(name), own)) fs::remove(name, ignored);
+    }
+  };
+}
+
+}  // namespace stillmap
