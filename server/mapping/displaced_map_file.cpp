@@ -70,10 +70,10 @@ void MapSaver::write_anew(MapFileFate fate) {
   if (fate == MapFileFate::removed && take_name_again()) {
     leave_store_for(file_);
   } else {
-    const fs::path target = folder_.unused_file_for(file_);
+    const fs::path target = folder_.unused_file_for(left_file_.value_or(file_));
     auto target_lock = std::make_unique<MapLock>(target);
     if (!store_->copy_to_new(target)) throw MapFileError(target, "was made by somebody just now");
-    left_file_ = file_;
+    if (!left_file_) left_file_ = file_;
     leave_store_for(target);
     lock_ = std::move(target_lock);
   }
@@ -81,11 +81,11 @@ void MapSaver::write_anew(MapFileFate fate) {
 }
 
 void MapSaver::write_anew_from_memory() {
-  const fs::path target = folder_.unused_file_for(file_);
+  const fs::path target = folder_.unused_file_for(left_file_.value_or(file_));
   auto target_lock = std::make_unique<MapLock>(target);
   // So that a disk without room is noticed before the store is left.
   static_cast<void>(open_map_file(target));
-  left_file_ = file_;
+  if (!left_file_) left_file_ = file_;
   is_session_ = false;
   saved_map_id_ = 0;
   is_memory_alone_ = true;

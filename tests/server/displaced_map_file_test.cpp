@@ -3,9 +3,11 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <stdexcept>
+#include <functional>
+#include <utility>
 
 #include "core/map/map_id.hpp"
 #include "core/map/static_map.hpp"
@@ -42,6 +44,7 @@ class DisplacedMapFile : public testing::Test, public CheckpointSource {
   RunCheckpoint checkpoint(CheckpointScope scope) override {
     const MapCheckpoint map = map_.checkpoint(scope);
     step_ = map.step;
+    if (while_saving_) std::exchange(while_saving_, nullptr)();
     latest_map_.publish(map.view);
     RunCheckpoint checkpoint{to_saved_map(map), map.step};
     checkpoint.map.trajectory = latest_map_.trajectory();
@@ -121,6 +124,7 @@ class DisplacedMapFile : public testing::Test, public CheckpointSource {
                   file_,
                   {},
                   {.memory_limit_mib = 64, .session = {.source = "test", .withdrawable = 2}}};
+  std::function<void()> while_saving_;
   std::uint64_t step_ = 0;
   std::int64_t last_ns_ = 0;
 };
@@ -224,6 +228,25 @@ TEST_F(DisplacedMapFile, ALoadOfItsNameOpensWhatLiesThereNow) {
   map_scan(-10.0F);
   saver_.save_at_end();
   EXPECT_THAT(tiles_in(file_), testing::ElementsAre(-1, 2));
+}
+
+TEST_F(DisplacedMapFile, AContentThatIsCopiedOverItDuringASaveStays) {
+  map_scan(30.0F);
+  while_saving_ = [this] { copy_over(); };
+  EXPECT_THROW(saver_.save_as(""), MapFileError);
+  EXPECT_THAT(tiles_in(saver_.save_as("")), testing::ElementsAre(0, 1));
+  EXPECT_EQ(content_of(file_), content_of(folder_ / "backup.stillmap"));
+}
+
+TEST_F(DisplacedMapFile, NamesDoNotGrowWithEveryTime) {
+  std::size_t longest = 0;
+  for (int time = 0; time < 3; ++time) {
+    map_scan(30.0F);
+    const fs::path current = saver_.save_as("");
+    longest = std::max(longest, current.filename().string().size());
+    std::ofstream(current, std::ios::binary | std::ios::trunc) << "no map";
+  }
+  EXPECT_LE(longest, std::string("city.2026-05-31_142500.2.stillmap").size());
 }
 
 TEST_F(DisplacedMapFile, AResetKeepsTheMapWhoseFileWasReplaced) {

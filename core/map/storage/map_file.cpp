@@ -129,7 +129,10 @@ class SqliteMapStore : public MapStore {
       : folder_(std::move(folder)),
         file_(file),
         database_(open_map_database(file)),
-        watch_(file, database_) {}
+        watch_(file, database_) {
+    // Only when it is certain whose file that is.
+    database_.exec("PRAGMA wal_autocheckpoint = 0");
+  }
 
   std::uint64_t save(const SavedMap& map) override {
     std::uint64_t log_bytes = 0;
@@ -139,10 +142,14 @@ class SqliteMapStore : public MapStore {
       read_what_is_saved();
       if (!log_is_empty_) empty_log("PASSIVE");
       if (!saved_tiles_) saved_tiles_ = read_tile_infos(database_);
+      const bool was_alone = log_is_empty_;
       write_with_session(map, tiles_after(map));
       std::error_code no_log;
       log_bytes = fs::file_size(beside(file_, "-wal"), no_log);
       if (no_log) log_bytes = 0;
+      is_overwritten_ = watch_.has_own_name() && !watch_.is_own_content(was_alone);
+      if (is_overwritten_)
+        throw SQLite::Exception("another program wrote to the file", SQLITE_CORRUPT);
       // So that a copy of the file alone is a copy of the map.
       empty_log("TRUNCATE");
     });
@@ -240,7 +247,9 @@ class SqliteMapStore : public MapStore {
     }
   }
 
-  MapFileFate fate() override { return watch_.fate(database_); }
+  MapFileFate fate() override {
+    return is_overwritten_ ? MapFileFate::overwritten : watch_.fate(database_);
+  }
 
   std::function<void()> abandon() override {
     sqlite3_db_config(database_.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
@@ -365,13 +374,20 @@ class SqliteMapStore : public MapStore {
   void forget_if_changed_by_others() {
     const std::int64_t version = database_.execAndGet("PRAGMA data_version").getInt64();
     if (version == data_version_) return;
-    data_version_ = version;
+    follow_others(version);
     saved_trajectory_.reset();
     saved_tiles_.reset();
   }
 
+  void follow_others(std::int64_t version) {
+    data_version_ = version;
+    log_is_empty_ = false;
+    watch_.remember(database_);
+  }
+
   void remember(const SavedMap& stored) {
-    data_version_ = database_.execAndGet("PRAGMA data_version").getInt64();
+    const std::int64_t version = database_.execAndGet("PRAGMA data_version").getInt64();
+    if (version != data_version_) follow_others(version);
     saved_trajectory_ = stored.trajectory;
     saved_tiles_ = stored.view.tiles;
   }
@@ -380,6 +396,8 @@ class SqliteMapStore : public MapStore {
   fs::path file_;
   SQLite::Database database_;
   MapFileWatch watch_;
+  /// Found while it was saved; the log has what the file does not.
+  bool is_overwritten_ = false;
   /// What is stored, once it was read: a save looks at what differs from it.
   std::optional<SharedTrajectory> saved_trajectory_;
   std::optional<TileTable> saved_tiles_;

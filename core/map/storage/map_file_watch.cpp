@@ -52,22 +52,23 @@ void MapFileWatch::remember(SQLite::Database& database) {
 }
 
 MapFileFate MapFileWatch::fate(SQLite::Database& database) {
-  const auto named = FileState::of(file_);
-  if (!named) return MapFileFate::removed;
-  if (!is_same_file(named, opened_)) return MapFileFate::replaced;
+  if (!FileState::of(file_)) return MapFileFate::removed;
+  if (!has_own_name()) return MapFileFate::replaced;
   try {
     // Another connection has saved there.
     if (data_version(database) != data_version_) remember(database);
   } catch (const SQLite::Exception&) {
     return MapFileFate::overwritten;
   }
-  return is_own_content() ? MapFileFate::kept : MapFileFate::overwritten;
+  return is_own_content(has_empty_log()) ? MapFileFate::kept : MapFileFate::overwritten;
 }
 
-bool MapFileWatch::is_own_content() const {
+bool MapFileWatch::has_own_name() const { return is_same_file(FileState::of(file_), opened_); }
+
+bool MapFileWatch::is_own_content(bool is_alone) const {
   if (!marks_) return true;
   const LastMark last = last_mark_without_log(file_);
-  if (has_empty_log()) {
+  if (is_alone) {
     const auto own = marks_->empty() ? std::nullopt : std::make_optional(marks_->back());
     return last.is_readable && last.mark == own;
   }

@@ -24,12 +24,16 @@ class MapFileWatch {
   /// After every write of the connection, also one that failed.
   void remember(SQLite::Database& database);
   [[nodiscard]] MapFileFate fate(SQLite::Database& database);
+  /// Whether the name is still that of the file that was opened.
+  [[nodiscard]] bool has_own_name() const;
+  /// Whether the file alone is what the connection left of it. Without a log, or with one of which
+  /// nothing is in the file yet, it must be readable.
+  [[nodiscard]] bool is_own_content(bool is_alone) const;
   /// Removes the log's files that this connection made or found, unless others have their names.
   [[nodiscard]] std::function<void()> log_removal() const;
 
  private:
   [[nodiscard]] bool has_empty_log() const;
-  [[nodiscard]] bool is_own_content() const;
 
   std::filesystem::path file_;
   /// Nothing where the name was another file's by then.
