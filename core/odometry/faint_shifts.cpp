@@ -12,7 +12,7 @@ constexpr double max_faint_share = 0.05;
 /// So far to either side [m]: the local map's points are 0.2 m apart, and the neighbours there are
 /// others.
 constexpr double beside_m = 0.3;
-/// Share of the features that must lie worse there.
+/// Share of what the features count that must lie worse there.
 constexpr double min_fit_lost = 0.005;
 
 /// Direction of the shift that the scan shows least, along the map's axes.
@@ -40,7 +40,10 @@ OdometryResult doubted_where_shift_fits(OdometryResult found, const FeatureSets&
                        config, found.sweep_correction);
   };
   const double fit_beside = 0.5 * (fit_at(-beside_m) + fit_at(beside_m));
-  if (fit_at(0.0) - fit_beside < min_fit_lost) found.health = OdometryHealth::degenerate;
+  if (fit_at(0.0) - fit_beside >= min_fit_lost) return found;
+  found.health = OdometryHealth::degenerate;
+  // 1 m, as of all that the scan does not observe.
+  found.covariance.topLeftCorner<3, 3>() += *shift_map * shift_map->transpose();
   return found;
 }
 

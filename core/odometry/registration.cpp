@@ -428,15 +428,23 @@ double counted_fit(const FeatureSets& features, const LocalMap& map,
   find_all_correspondences(features, map, pose, limits_for(features, config.registration),
                            correspondences);
   double scores = 0.0;
+  double weights = 0.0;
   for (const Correspondence& c : correspondences) {
-    if (!c.found) continue;
+    if (!c.found) {
+      weights += 1.0;
+      continue;
+    }
     const Residual r = residual(c.point_lidar, T_map_lidar, c.surface);
     double squared = 0.0;
-    for (std::size_t k = 0; k < r.count; ++k)
+    double weight = 0.0;
+    for (std::size_t k = 0; k < r.count; ++k) {
       squared += c.surface.weights[k] * r.distances[k] * r.distances[k];
-    scores += geman_mcclure(fit_scale_m, squared);
+      weight = std::max(weight, c.surface.weights[k]);
+    }
+    weights += weight;
+    scores += weight * geman_mcclure(fit_scale_m, squared);
   }
-  return scores / std::max(1.0, static_cast<double>(correspondences.size()));
+  return scores / std::max(least_weights, weights);
 }
 
 OdometryResult register_in_two_stages(const FeatureSets& features, const LocalMap& map,

@@ -82,9 +82,9 @@ struct LocalMap {
                                                const OdometryConfig& config,
                                                const SweepCorrection& sweep_correction = {});
 
-/// How well a scan lies on the map at a pose that is not moved: OdometryResult::fit by those
-/// distances alone that count (FittedSurface::weights), 0..1. Rings on level ground lie well
-/// wherever the lidar is, and leave it as it is.
+/// How well a scan lies on the map at a pose that is not moved, 0..1: OdometryResult::fit by those
+/// distances alone that count, each feature by what it counts (FittedSurface::weights). Rings on
+/// level ground lie well wherever the lidar is, and leave it as it is.
 [[nodiscard]] double counted_fit(const FeatureSets& features, const LocalMap& map,
                                  const Eigen::Isometry3d& T_map_lidar, const OdometryConfig& config,
                                  const SweepCorrection& sweep_correction = {});

@@ -10,11 +10,11 @@
 namespace stillmap {
 namespace {
 
-/// Points of a passage of 6 m by 4 m round the lidar, 80 m long, with noise; with a wall across it
-/// 20 m ahead of the map's origin, or without an end.
-FeatureSets passage(double lidar_x_m, bool has_end, unsigned seed) {
+/// Points of a passage of 6 m by 4 m round the lidar, 80 m long, with noise; with so many on a wall
+/// across it 20 m ahead of the map's origin, or without an end.
+FeatureSets passage(double lidar_x_m, int end_points, unsigned seed) {
   std::mt19937 random(seed);
-  std::uniform_real_distribution<float> along(-40.0F, has_end ? 20.0F : 40.0F);
+  std::uniform_real_distribution<float> along(-40.0F, end_points > 0 ? 20.0F : 40.0F);
   std::uniform_real_distribution<float> unit(-1.0F, 1.0F);
   std::normal_distribution<float> noise(0.0F, 0.03F);
   FeatureSets sets;
@@ -26,16 +26,16 @@ FeatureSets passage(double lidar_x_m, bool has_end, unsigned seed) {
   for (int k = 0; k < 800; ++k) {
     add(along(random), k % 2 == 0 ? 3.0F : -3.0F, 2.0F * unit(random));
     add(along(random), 3.0F * unit(random), k % 2 == 0 ? 2.0F : -2.0F);
-    if (has_end && k < 100) add(20.0F, 3.0F * unit(random), 2.0F * unit(random));
+    if (k < end_points) add(20.0F, 3.0F * unit(random), 2.0F * unit(random));
   }
   return sets;
 }
 
-LocalMap map_of(bool has_end) {
+LocalMap map_of(int end_points) {
   LocalMap map{LocalMapConfig{}};
   for (unsigned seed = 1; seed <= 10; ++seed) {
     FeatureSets sets;
-    sets.planes = passage(0.0, has_end, seed).surfaces;
+    sets.planes = passage(0.0, end_points, seed).surfaces;
     extend_local_map(map, sets, Eigen::Isometry3d::Identity(), {});
   }
   return map;
@@ -50,19 +50,21 @@ OdometryResult registered(const FeatureSets& features, const LocalMap& map,
 }
 
 TEST(FaintShifts, APassageWithoutAnEndIsDegenerateHoweverItsNormalsLean) {
-  const LocalMap map = map_of(/*has_end=*/false);
-  const FeatureSets features = passage(1.0, /*has_end=*/false, 77);
+  const LocalMap map = map_of(/*end_points=*/0);
+  const FeatureSets features = passage(1.0, /*end_points=*/0, 77);
   const OdometryConfig config;
   const OdometryResult found = registered(features, map, config);
   ASSERT_EQ(found.health, OdometryHealth::good);
   const OdometryResult doubted = doubted_where_shift_fits(found, features, map, config);
   EXPECT_EQ(doubted.health, OdometryHealth::degenerate);
   EXPECT_TRUE(doubted.T_map_lidar.isApprox(found.T_map_lidar)) << "it is not moved";
+  EXPECT_NEAR(doubted.covariance(0, 0), 1.0, 0.05);
+  EXPECT_LT(doubted.covariance(1, 1), 0.01);
 }
 
 TEST(FaintShifts, AWallAcrossItShowsTheWay) {
-  const LocalMap map = map_of(/*has_end=*/true);
-  const FeatureSets features = passage(1.0, /*has_end=*/true, 77);
+  const LocalMap map = map_of(/*end_points=*/100);
+  const FeatureSets features = passage(1.0, /*end_points=*/100, 77);
   const OdometryConfig config;
   const OdometryResult found = registered(features, map, config);
   EXPECT_NEAR(found.T_map_lidar.translation().x(), 1.0, 0.02);
@@ -70,8 +72,8 @@ TEST(FaintShifts, AWallAcrossItShowsTheWay) {
 }
 
 TEST(FaintShifts, ThePapersMethodAndWhatIsLostStayAsTheyAre) {
-  const LocalMap map = map_of(/*has_end=*/false);
-  const FeatureSets features = passage(1.0, /*has_end=*/false, 77);
+  const LocalMap map = map_of(/*end_points=*/0);
+  const FeatureSets features = passage(1.0, /*end_points=*/0, 77);
   OdometryConfig paper;
   paper.paper_exact = true;
   const OdometryResult found = registered(features, map, paper);
