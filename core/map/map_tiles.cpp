@@ -6,6 +6,7 @@
 #include <functional>
 #include <iterator>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 namespace stillmap {
@@ -17,6 +18,14 @@ constexpr std::size_t non_resident_tile_bytes = sizeof(Tile) + 64;
 TileRange range_round(const Eigen::Vector3d& position_map, double reach_m, double tile_size_m) {
   const Eigen::Vector3d reach = Eigen::Vector3d::Constant(reach_m);
   return tile_range({position_map - reach, position_map + reach}, tile_size_m);
+}
+
+/// Whether a stored tile is that which was evicted: somebody may have put another file in the map's
+/// place.
+bool is_of(const std::shared_ptr<const Tile>& stand_in, const std::shared_ptr<const Tile>& stored) {
+  if (!stored) return true;
+  return stand_in && stored->info.revision == stand_in->info.revision &&
+         stored->info.content_hash == stand_in->info.content_hash;
 }
 
 }  // namespace
@@ -203,6 +212,10 @@ bool MapTiles::reload_now(TileId id) {
   const std::shared_ptr<const Tile> stand_in = shown(id);
   try {
     TileRecord record = store_->load(id);
+    if (!is_of(stand_in, record.tile)) {
+      throw std::runtime_error("tile (" + std::to_string(id.x) + ", " + std::to_string(id.y) +
+                               ") of the map's file is another one than was stored there");
+    }
     if (record.tile && stand_in && stand_in->info.appeared_in != 0) {
       // The file does not know it.
       auto tile = std::make_shared<Tile>(*record.tile);

@@ -270,6 +270,21 @@ TEST_F(DisplacedMapFile, AMapThatCannotBeWrittenAnewIsAFailureUntilItCan) {
   fs::remove_all(folder_.path().string() + "-away");
 }
 
+TEST_F(DisplacedMapFile, ATileOfAnotherMapDoesNotEnter) {
+  evict_all();
+  StaticMap other{StaticMapConfig()};
+  other.reset(new_map_id());
+  other.insert(scan_at(8.0F), Eigen::Isometry3d::Identity());
+  fs::remove(folder_ / "backup.stillmap");
+  open_map_file(folder_ / "backup.stillmap")
+      ->save(to_saved_map(other.checkpoint(CheckpointScope::everything)));
+  copy_over();
+  // Before the next checkpoint looks.
+  map_scan(5.0F);
+  EXPECT_EQ(map_.view()->tiles.non_resident_count(), 1U);
+  EXPECT_THAT(map_.unreadable_tiles(), testing::ElementsAre(HasSubstr("another one")));
+}
+
 TEST_F(DisplacedMapFile, OtherConnectionsOfStillmapAreNoStrangers) {
   map_scan(30.0F);
   saver_.save_if_changed();
