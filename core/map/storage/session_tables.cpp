@@ -168,8 +168,7 @@ GrowingSession::GrowingSession(SQLite::Database& database, const SharedTrajector
       first_pose_(stored_path.size()),
       metadata_before_(read_metadata(database)),
       measured_(first_pose_) {
-  // Clients have seen later versions under the map's id than those of before: withdrawn, it gets a
-  // new one.
+  // It tells a reader of the file how its last run ended; nothing decides by it.
   metadata_before_.erase(map_ended_key);
   const std::vector<MapSession> earlier = read_sessions(database, stored_path);
   number_ = earlier.empty() ? 1 : earlier.back().number + 1;
