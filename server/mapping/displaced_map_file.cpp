@@ -30,27 +30,51 @@ std::string words_of(MapFileFate fate) {
 
 }  // namespace
 
+void MapSaver::count_failure(const std::exception& error) {
+  statistics_.map_save_failed(error.what());
+  // Where the map fills its memory, it is frozen.
+  source_->checkpoint_failed();
+}
+
+void MapSaver::look_after_file_first() {
+  try {
+    look_after_file();
+  } catch (const std::exception& error) {
+    count_failure(error);
+    throw;
+  }
+}
+
 void MapSaver::look_after_file() {
   if (!store_ || file_.empty()) return;
   const MapFileFate fate = store_->fate();
   if (fate == MapFileFate::kept) return;
+  if (fate == MapFileFate::replaced && store_->is_same_under_name()) {
+    leave_store_for(file_);
+    static_cast<void>(open_store());
+    return;
+  }
   const auto began = std::chrono::steady_clock::now();
   const MapFileError displaced(file_, words_of(fate));
   throttled_log_.error("displaced",
                        std::string(displaced.what()) + "; the running map is written anew");
-  statistics_.map_save_failed(displaced.what());
   try {
     if (fate == MapFileFate::overwritten) {
       write_anew_from_memory();
-    } else {
-      write_anew(fate);
+    } else if (!write_anew(fate)) {
+      return;
     }
-  } catch (const MapFileError& error) {
-    statistics_.map_save_failed(std::string(displaced.what()) + "; " + error.what());
-    throw;
+  } catch (const std::exception& error) {
+    throw MapFileError(file_, words_of(fate) + "; " + error.what());
   }
+  statistics_.map_save_failed(displaced.what());
   statistics_.count(counter);
   spdlog::warn("the running map goes on in {}", file_.string());
+  if (left_file_) {
+    statistics_.set_map_displaced(left_file_->string() +
+                                  ": is not the running map's file any more; that goes on in " +
+                                  file_.string() + " until another map is loaded");
+  }
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
   // What is in memory alone is still to be saved.
   if (saved_map_id_ != 0) statistics_.map_saved(took.count());
@@ -59,33 +83,50 @@ void MapSaver::look_after_file() {
 bool MapSaver::take_name_again() {
   try {
     if (!lock_->is_held()) lock_ = std::make_unique<MapLock>(file_);
-  } catch (const MapFileError&) {
+  } catch (const MapFileInUseError&) {
     // Another server's by now.
     return false;
   }
   return store_->copy_to_new(file_);
 }
 
-void MapSaver::write_anew(MapFileFate fate) {
+bool MapSaver::write_anew(MapFileFate fate) {
   if (fate == MapFileFate::removed && take_name_again()) {
     leave_store_for(file_);
   } else {
-    const fs::path target = folder_.unused_file_for(left_file_.value_or(file_));
+    // It may have been away for a moment.
+    if (store_->fate() == MapFileFate::kept) return false;
+    const fs::path target = name_beside();
     auto target_lock = std::make_unique<MapLock>(target);
     if (!store_->copy_to_new(target)) throw MapFileError(target, "was made by somebody just now");
-    if (!left_file_) left_file_ = file_;
+    leave_name();
     leave_store_for(target);
     lock_ = std::move(target_lock);
   }
   static_cast<void>(open_store());
+  return true;
+}
+
+fs::path MapSaver::name_beside() const {
+  const fs::path target = folder_.unused_file_for(left_file_.value_or(file_));
+  std::error_code unknown;
+  const std::uintmax_t bytes = fs::file_size(file_, unknown);
+  // The file that lies under the name counts too: whose it is does not matter.
+  if (!has_ended_) folder_.check_room(file_, {}, unknown ? 0 : bytes);
+  return target;
+}
+
+void MapSaver::leave_name() {
+  if (!left_file_) left_file_ = file_;
+  is_left_file_loaded_ = true;
 }
 
 void MapSaver::write_anew_from_memory() {
-  const fs::path target = folder_.unused_file_for(left_file_.value_or(file_));
+  const fs::path target = name_beside();
   auto target_lock = std::make_unique<MapLock>(target);
   // So that a disk without room is noticed before the store is left.
   static_cast<void>(open_map_file(target));
-  if (!left_file_) left_file_ = file_;
+  leave_name();
   is_session_ = false;
   saved_map_id_ = 0;
   is_memory_alone_ = true;

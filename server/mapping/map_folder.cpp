@@ -75,9 +75,11 @@ fs::path MapFolder::unused_file_for(const fs::path& map_file) const {
   const std::string stem = map_file.stem().string() + "." + local_time();
   const std::string extension = map_file.extension().string();
   fs::path file = folder_ / (stem + extension);
-  for (int n = 2; fs::exists(file); ++n) {
+  std::error_code fault;
+  for (int n = 2; fs::exists(file, fault); ++n) {
     file = folder_ / (stem + "." + std::to_string(n) + extension);
   }
+  if (fault) throw MapFileError(file, "cannot be made (" + fault.message() + ")");
   return file;
 }
 
@@ -85,23 +87,24 @@ void MapFolder::check_room(const fs::path& running, const fs::path& replaced,
                            std::uintmax_t bytes) const {
   std::uintmax_t maps = 1;
   std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
-    const fs::path& file = entry.path();
+  for (fs::directory_iterator entry(folder_, error); !error && entry != fs::directory_iterator();
+       entry.increment(error)) {
+    const fs::path& file = entry->path();
+    std::error_code unknown;
     // Opening the running map's file and closing it again would release SQLite's locks on it. It
     // may have other names.
-    const bool is_running = fs::equivalent(file, running, error);
-    if (is_running || fs::equivalent(file, replaced, error) || !is_map_file(file)) continue;
+    const bool is_running = fs::equivalent(file, running, unknown);
+    if (is_running || fs::equivalent(file, replaced, unknown) || !is_map_file(file)) continue;
     ++maps;
-    const std::uintmax_t size = entry.file_size(error);
-    if (!error) bytes += size;
+    const std::uintmax_t size = entry->file_size(unknown);
+    if (!unknown) bytes += size;
   }
   if (maps <= limit_.max_maps && bytes <= limit_.max_bytes) return;
-  throw std::invalid_argument("with it, there would be " + std::to_string(maps) +
-                              " saved maps of " + std::to_string(bytes >> 20) + " MiB in " +
-                              folder_.string() + ", and the limits are " +
-                              std::to_string(limit_.max_maps) + " (map.saved_maps) and " +
-                              std::to_string(limit_.max_bytes >> 20) +
-                              " MiB (map.saved_maps_mib): remove some there, or raise the limits");
+  throw RefusedNow("with it, there would be " + std::to_string(maps) + " saved maps of " +
+                   std::to_string(bytes >> 20) + " MiB in " + folder_.string() +
+                   ", and the limits are " + std::to_string(limit_.max_maps) +
+                   " (map.saved_maps) and " + std::to_string(limit_.max_bytes >> 20) +
+                   " MiB (map.saved_maps_mib): remove some there, or raise the limits");
 }
 
 }  // namespace stillmap::server

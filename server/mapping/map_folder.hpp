@@ -2,9 +2,16 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 
 namespace stillmap::server {
+
+/// What was asked for is well said, but cannot be done as things are.
+class RefusedNow : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 /// How much clients may have the server save beside its map file.
 struct SavedMapsLimit {
@@ -23,10 +30,11 @@ class MapFolder {
   /// elsewhere.
   [[nodiscard]] std::filesystem::path file_named(const std::string& name) const;
 
-  /// For a map that is kept when another one begins: a name that no file has, with the time.
+  /// For a map that is kept when another one begins: a name that no file has, with the time. Throws
+  /// MapFileError where names cannot be looked up.
   [[nodiscard]] std::filesystem::path unused_file_for(const std::filesystem::path& map_file) const;
 
-  /// Throws std::invalid_argument when one more map of so many bytes goes beyond the limit. The
+  /// Throws RefusedNow when one more map of so many bytes goes beyond the limit. The
   /// running map's file and the one to be replaced do not count.
   void check_room(const std::filesystem::path& running, const std::filesystem::path& replaced,
                   std::uintmax_t bytes) const;

@@ -125,7 +125,7 @@ void MapSaver::set_source(CheckpointSource& source) {
 
 void MapSaver::save_if_changed() {
   const std::scoped_lock lock(mutex_);
-  look_after_file();
+  look_after_file_first();
   if ((!store_ && file_.empty()) || is_saved()) return;
   // A temporary file is only there to make room in memory.
   if (file_.empty() && source_->memory_use().bytes < memory_limit_bytes_ / 2) return;
@@ -135,7 +135,9 @@ void MapSaver::save_if_changed() {
 void MapSaver::save_at_end() {
   const std::scoped_lock lock(mutex_);
   if (misplaced_) bring_back();
-  look_after_file();
+  // The map is not to be lost for a limit of what clients save.
+  has_ended_ = true;
+  look_after_file_first();
   // Nothing mapped: an empty map must not replace what the file holds.
   const bool is_map_empty = latest_map_.poses_added() == 0 && latest_map_.view()->tiles.empty();
   if (!file_.empty() && !(is_map_empty && is_saved())) save(CheckpointScope::changed, true);
@@ -185,8 +187,7 @@ void MapSaver::save(CheckpointScope scope, bool has_ended) {
     look_after_file();
     if (saved_map_id_ == 0) store(CheckpointScope::everything, has_ended);
   } catch (const std::exception& error) {
-    statistics_.map_save_failed(error.what());
-    source_->checkpoint_failed();
+    count_failure(error);
     throw;
   }
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
@@ -221,6 +222,8 @@ bool MapSaver::store(CheckpointScope scope, bool has_ended) {
     throw MapFileError(file_, "was overwritten just now; nothing was written to it");
   }
   const std::uint64_t bytes = file.save(checkpoint.map);
+  // Mapped anew, and in the file again.
+  std::erase_if(lost_tiles_, [&](TileId id) { return checkpoint.map.tile_evidence.contains(id); });
   source_->checkpoint_stored(checkpoint.step);
   remember_as_saved(checkpoint.map.view, poses);
   if (is_standing) standing_allowance_.spend(bytes);
@@ -245,7 +248,7 @@ void MapSaver::remember_metadata(const SavedMap& map) {
 
 fs::path MapSaver::file_named(const std::string& name) const {
   if (file_.empty() && name.empty()) {
-    throw std::invalid_argument(
+    throw RefusedNow(
         "no map file is configured; set map.file in the server's configuration or --map-file");
   }
   return name.empty() ? file_ : real_file(folder_.file_named(name));
@@ -257,30 +260,31 @@ bool MapSaver::is_empty() const {
 
 fs::path MapSaver::save_as(const std::string& name, bool overwrite) {
   const std::scoped_lock lock(mutex_);
-  look_after_file();
+  look_after_file_first();
   fs::path target = file_named(name);
   if (is_empty()) {
-    throw std::invalid_argument("the map is empty: no scan was mapped yet; nothing is saved");
+    throw RefusedNow("the map is empty: no scan was mapped yet; nothing is saved");
   }
   if ((store_ || !file_.empty()) && !is_saved_whole()) save(CheckpointScope::changed);
   if (target != file_) save_copy(target, overwrite);
   if (file_.empty()) copied_map_id_ = latest_map_.view()->map_id;
+  // Whoever saved was told where.
+  is_left_file_loaded_ = false;
   return target;
 }
 
 void MapSaver::save_copy(const fs::path& target, bool overwrite) {
-  const bool is_there = fs::exists(target);
+  std::error_code unknown;
+  const bool is_there = fs::exists(target, unknown);
   if (is_there && !is_map_file(target)) {
-    throw std::invalid_argument(target.string() +
-                                " is there already and no map file; name another file");
+    throw RefusedNow(target.string() + " is there already and no map file; name another file");
   }
   if (is_there && !overwrite) {
-    throw std::invalid_argument(target.string() +
-                                " holds a map already; name another file, or ask for it to be "
-                                "overwritten (stillmap save --overwrite)");
+    throw RefusedNow(target.string() +
+                     " holds a map already; name another file, or ask for it to be "
+                     "overwritten (stillmap save --overwrite)");
   }
   const MapLock target_lock(target);
-  std::error_code unknown;
   const std::uintmax_t bytes = file_.empty() ? 0 : fs::file_size(file_, unknown);
   folder_.check_room(file_, target, unknown ? 0 : bytes);
   if (store_ || !file_.empty()) {
@@ -298,7 +302,7 @@ void MapSaver::save_copy(const fs::path& target, bool overwrite) {
 
 void MapSaver::refuse_to_lose() const {
   if (!file_.empty() || is_empty() || copied_map_id_ == latest_map_.view()->map_id) return;
-  throw std::invalid_argument(
+  throw RefusedNow(
       "this server keeps its map in no file, and a load would lose it: 'stillmap save NAME' first "
       "('stillmap reset --discard' where it is not wanted)");
 }
@@ -307,8 +311,9 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
   const std::scoped_lock lock(mutex_);
   // It belongs under the name that the saver is about to leave.
   if (misplaced_) bring_back();
-  look_after_file();
-  fs::path target = name.empty() && left_file_ ? *left_file_ : file_named(name);
+  look_after_file_first();
+  fs::path target =
+      name.empty() && left_file_ && is_left_file_loaded_ ? *left_file_ : file_named(name);
   refuse_to_lose();
   const bool is_own = target == file_;
   auto target_lock = is_own ? nullptr : std::make_unique<MapLock>(target);
@@ -336,6 +341,7 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
     lock_ = std::move(target_lock);
   }
   left_file_.reset();
+  statistics_.set_map_displaced({});
   lost_tiles_.clear();
   is_memory_alone_ = false;
   remember_metadata(map);
@@ -348,6 +354,7 @@ NewMap MapSaver::begin_anew(bool discard, const BeginMap& begin) {
   const std::scoped_lock lock(mutex_);
   NewMap begun{.map_id = new_map_id(), .kept_file = {}};
   std::shared_ptr<MovableTileStore> tiles;
+  look_after_file_first();
   if (!file_.empty()) {
     if (!discard && !is_empty() && !is_saved_whole()) save(CheckpointScope::changed);
     if (open_store().holds_map()) {
@@ -371,6 +378,8 @@ NewMap MapSaver::begin_anew(bool discard, const BeginMap& begin) {
   saved_map_id_ = 0;
   lost_tiles_.clear();
   is_memory_alone_ = false;
+  // What lies there was never this map's.
+  is_left_file_loaded_ = false;
   stored_metadata_.clear();
   if (discard && !begun.kept_file.empty()) {
     std::error_code not_removed;
@@ -471,7 +480,7 @@ MonotonicClock::TimePoint CheckpointWorker::save_and_schedule() {
   const auto began = clock_.now();
   try {
     save_();
-  } catch (const MapFileError& error) {
+  } catch (const std::exception& error) {
     throttled_log_.error("save", std::string("the map was not saved: ") + error.what());
   }
   const auto ended = clock_.now();

@@ -158,8 +158,9 @@ class MapSaver {
   void make_room();
 
   /// Saves to `name` beside the configured file, or to the current file when empty; returns where.
-  /// Throws MapFileError, or std::invalid_argument for a name that is a path, one that another map
-  /// has already unless `overwrite`, beyond the limit of saved maps, and for a map that is empty.
+  /// Throws MapFileError, std::invalid_argument for a name that is a path, or RefusedNow for one
+  /// that another map has already unless `overwrite`, beyond the limit of saved maps, and for a map
+  /// that is empty.
   std::filesystem::path save_as(const std::string& name, bool overwrite = false);
 
   /// Makes `name` the current file: reads and prepares the map there under a new id, saves the
@@ -180,15 +181,23 @@ class MapSaver {
   [[nodiscard]] MapStore& open_store();
   /// Throws MapFileError where the map cannot be written anew; it is tried again with the next use.
   void look_after_file();
-  void write_anew(MapFileFate fate);
+  /// The same before a save, a load or a reset: what it throws counts as a checkpoint that failed.
+  void look_after_file_first();
+  void count_failure(const std::exception& error);
+  /// False where it is kept after all.
+  [[nodiscard]] bool write_anew(MapFileFate fate);
+  /// The name that a map gets which cannot have its own. Throws MapFileError beyond the limit of
+  /// saved maps, unless the run has ended.
+  [[nodiscard]] std::filesystem::path name_beside() const;
   /// False where the name is another file's, or another server's.
   [[nodiscard]] bool take_name_again();
   /// Tiles that were in the file alone are lost with its content.
   void write_anew_from_memory();
   /// The next file to be opened is `target`; the one that was open is somebody else's.
   void leave_store_for(const std::filesystem::path& target);
+  void leave_name();
   void leave_out_lost_tiles(SavedMap& map);
-  /// A map without a file that was never saved. Throws std::invalid_argument.
+  /// A map without a file that was never saved. Throws RefusedNow.
   void refuse_to_lose() const;
   [[nodiscard]] SavedMap read(MapStore& store) const;
   /// All that a checkpoint in the present scope would store.
@@ -203,7 +212,8 @@ class MapSaver {
   /// False where there was nothing to write.
   bool store(CheckpointScope scope, bool has_ended);
   [[nodiscard]] RunCheckpoint take(CheckpointScope scope) const;
-  /// The current file when empty. Throws std::invalid_argument.
+  /// The current file when empty. Throws std::invalid_argument for what is no plain name,
+  /// RefusedNow where there is no current file.
   [[nodiscard]] std::filesystem::path file_named(const std::string& name) const;
   void save_copy(const std::filesystem::path& target, bool overwrite);
   [[nodiscard]] bool is_empty() const;
@@ -239,6 +249,9 @@ class MapSaver {
   std::optional<std::filesystem::path> misplaced_;
   /// The name that the running map had until somebody put another file there.
   std::optional<std::filesystem::path> left_file_;
+  /// A load without a name means that file.
+  bool is_left_file_loaded_ = false;
+  bool has_ended_ = false;
   /// The file's content is gone, and nothing was saved since.
   bool is_memory_alone_ = false;
   std::vector<TileId> lost_tiles_;
@@ -264,8 +277,8 @@ class MapSaver {
 [[nodiscard]] std::chrono::duration<double> due_after_begin(std::chrono::duration<double> period,
                                                             std::chrono::duration<double> longest);
 
-/// Calls `save` again and again on a thread of its own until destroyed. Logs the MapFileErrors that
-/// it throws.
+/// Calls `save` again and again on a thread of its own until destroyed. Logs what it
+/// throws.
 class CheckpointWorker {
  public:
   CheckpointWorker(std::chrono::duration<double> period, std::function<void()> save,

@@ -120,6 +120,11 @@ void Statistics::map_save_failed(const std::string& why) {
   metrics_->checkpoints_failing.Increment();
 }
 
+void Statistics::set_map_displaced(const std::string& text) {
+  const std::scoped_lock lock(mutex_);
+  map_displaced_ = text;
+}
+
 void Statistics::set_sensor(const std::string& name) {
   const std::scoped_lock lock(mutex_);
   sensor_ = name;
@@ -217,7 +222,7 @@ std::string Statistics::last_drop() const {
 
 std::string Statistics::last_save_failure() const {
   const std::scoped_lock lock(mutex_);
-  return last_save_failure_;
+  return last_save_failure_.empty() ? map_displaced_ : last_save_failure_;
 }
 
 std::string Statistics::last_segmentation_failure() const {

@@ -56,6 +56,9 @@ class Statistics {
   void map_saved(double seconds);
   /// `why` is told in the status until a save succeeds.
   void map_save_failed(const std::string& why);
+  /// Told there also while saves succeed: which file they do not go to. Empty: they go where they
+  /// should.
+  void set_map_displaced(const std::string& text);
 
   /// The lidar that scans are taken to come from; empty until its scans have told it.
   void set_sensor(const std::string& name);
@@ -79,7 +82,8 @@ class Statistics {
   [[nodiscard]] std::chrono::steady_clock::time_point started() const { return started_; }
   /// Why the last scan was dropped; empty once a later one was mapped.
   [[nodiscard]] std::string last_drop() const;
-  /// Why the last save of the map failed; empty once a later one succeeded.
+  /// Why the last save of the map failed, or what is wrong with where the map is saved; empty once
+  /// a later one succeeded where it should.
   [[nodiscard]] std::string last_save_failure() const;
   [[nodiscard]] std::string place_search() const;
   /// Why the last segmentation failed; empty once a later one worked.
@@ -115,6 +119,7 @@ class Statistics {
   dds::SegmentationStatus segmentation_;
   std::string last_segmentation_failure_;
   std::string last_save_failure_;
+  std::string map_displaced_;
   std::string sensor_;
   std::string place_search_;
 };

@@ -2,17 +2,20 @@
 // running map is not lost, and what lies there now stays as it is.
 
 #include <gmock/gmock.h>
+#include <sqlite3.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <string>
 #include <utility>
 
 #include "core/map/map_id.hpp"
 #include "core/map/static_map.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "server/mapping/map_saver.hpp"
+#include "server/monitoring/metrics.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap::server {
@@ -51,7 +54,7 @@ class DisplacedMapFile : public testing::Test, public CheckpointSource {
     return checkpoint;
   }
   void checkpoint_stored(std::uint64_t step) override { map_.checkpoint_stored(step); }
-  void checkpoint_failed() override {}
+  void checkpoint_failed() override { ++failed_; }
   [[nodiscard]] MemoryUse memory_use() override { return {}; }
 
   void begin(std::uint64_t map_id, const std::shared_ptr<TileStore>& tiles) {
@@ -127,6 +130,7 @@ class DisplacedMapFile : public testing::Test, public CheckpointSource {
   std::function<void()> while_saving_;
   std::uint64_t step_ = 0;
   std::int64_t last_ns_ = 0;
+  int failed_ = 0;
 };
 
 TEST_F(DisplacedMapFile, AFileThatWasRemovedIsWrittenAnewWithWhatWasOnTheDiskAlone) {
@@ -270,6 +274,60 @@ TEST_F(DisplacedMapFile, AMapThatCannotBeWrittenAnewIsAFailureUntilItCan) {
   fs::remove_all(folder_.path().string() + "-away");
 }
 
+TEST_F(DisplacedMapFile, ANameThatCannotBeLookedAtIsAFailureAndNoRemoval) {
+  const fs::path away = folder_.path().string() + "-away";
+  fs::rename(folder_.path(), away);
+  fs::create_directory_symlink(folder_.path(), folder_.path());
+  map_scan(30.0F);
+  EXPECT_THROW(saver_.save_if_changed(), MapFileError);
+  EXPECT_THROW(saver_.save_at_end(), MapFileError);
+  EXPECT_THAT(statistics_.last_save_failure(), HasSubstr("cannot be looked at"));
+  EXPECT_EQ(failed_, 2) << "the mapper is to freeze a map that fills its memory";
+  fs::remove(folder_.path());
+  fs::rename(away, folder_.path());
+  EXPECT_EQ(saver_.save_as(""), file_);
+  EXPECT_EQ(displaced(), 0U);
+  EXPECT_EQ(statistics_.last_save_failure(), "");
+}
+
+TEST_F(DisplacedMapFile, EachAttemptToWriteItAnewCountsOneFailure) {
+  fs::rename(folder_.path(), folder_.path().string() + "-away");
+  map_scan(30.0F);
+  for (int attempt = 1; attempt <= 3; ++attempt) {
+    EXPECT_THROW(saver_.save_if_changed(), MapFileError);
+    EXPECT_EQ(failed_, attempt);
+    EXPECT_EQ(statistics_.metrics().checkpoint_failures.Value(), attempt);
+  }
+  fs::rename(folder_.path().string() + "-away", folder_.path());
+}
+
+TEST_F(DisplacedMapFile, TheStatusSaysSoUntilTheOperatorLoads) {
+  put_back();
+  map_scan(30.0F);
+  const fs::path saved = saver_.save_as("");
+  map_scan(50.0F);
+  saver_.save_if_changed();
+  EXPECT_THAT(statistics_.last_save_failure(), HasSubstr("goes on in " + saved.string()));
+  load("city.stillmap");
+  EXPECT_EQ(statistics_.last_save_failure(), "");
+}
+
+TEST_F(DisplacedMapFile, ATileThatWasLostAndMappedAnewStays) {
+  map_scan(30.0F);
+  saver_.save_if_changed();
+  evict_all();
+  map_scan(50.0F);
+  std::ofstream(file_, std::ios::binary | std::ios::trunc) << "no map";
+  const fs::path saved = saver_.save_as("");
+  map_scan(5.0F);
+  map_scan(5.0F);
+  saver_.save_as("");
+  evict_all();
+  map_scan(-10.0F);
+  saver_.save_as("");
+  EXPECT_THAT(tiles_in(saved), testing::ElementsAre(-1, 0, 2));
+}
+
 TEST_F(DisplacedMapFile, ATileOfAnotherMapDoesNotEnter) {
   evict_all();
   StaticMap other{StaticMapConfig()};
@@ -283,6 +341,54 @@ TEST_F(DisplacedMapFile, ATileOfAnotherMapDoesNotEnter) {
   map_scan(5.0F);
   EXPECT_EQ(map_.view()->tiles.non_resident_count(), 1U);
   EXPECT_THAT(map_.unreadable_tiles(), testing::ElementsAre(HasSubstr("another one")));
+}
+
+TEST_F(DisplacedMapFile, ACopyOfItsLastStateIsItself) {
+  for (const float x : {30.0F, 50.0F, -10.0F, -30.0F}) {
+    fs::copy_file(file_, folder_ / "copy");
+    fs::rename(folder_ / "copy", file_);
+    map_scan(x);
+    EXPECT_EQ(saver_.save_as(""), file_);
+  }
+  EXPECT_TRUE(others().empty());
+  EXPECT_THAT(tiles_in(file_), testing::ElementsAre(-2, -1, 0, 1, 2));
+}
+
+TEST_F(DisplacedMapFile, ALoadWithoutANameIsOfTheLastSaveOnceAnotherMapBegan) {
+  put_back();
+  map_scan(30.0F);
+  saver_.save_as("");
+  saver_.begin_anew(false, [this](auto id, const auto& tiles) { begin(id, tiles); });
+  map_scan(50.0F);
+  const fs::path own = saver_.save_as("");
+  EXPECT_EQ(load(""), own);
+}
+
+TEST_F(DisplacedMapFile, AHalfCopyIsNotWrittenToWhileALogIsInUse) {
+  sqlite3* reader = nullptr;
+  ASSERT_EQ(sqlite3_open(file_.c_str(), &reader), SQLITE_OK);
+  sqlite3_exec(reader, "BEGIN; SELECT count(*) FROM tiles", nullptr, nullptr, nullptr);
+  map_scan(30.0F);
+  saver_.save_if_changed();
+  ASSERT_GT(fs::file_size(file_.string() + "-wal"), 0U);
+  const std::string content = content_of(folder_ / "backup.stillmap");
+  const std::string half = content.substr(0, content.size() / 4);
+  std::ofstream(file_, std::ios::binary | std::ios::trunc) << half;
+  map_scan(50.0F);
+  const fs::path saved = saver_.save_as("");
+  EXPECT_NE(saved, file_);
+  EXPECT_EQ(content_of(file_), half);
+  sqlite3_exec(reader, "COMMIT", nullptr, nullptr, nullptr);
+  sqlite3_close(reader);
+}
+
+TEST_F(DisplacedMapFile, WhatCannotBeDoneNowIsNoBadRequest) {
+  EXPECT_THROW(saver_.save_as("backup.stillmap"), RefusedNow);
+  std::ofstream(folder_ / "notes.txt") << "no map";
+  EXPECT_THROW(saver_.save_as("notes.txt", true), RefusedNow);
+  saver_.begin_anew(true, [this](auto id, const auto& tiles) { begin(id, tiles); });
+  EXPECT_THROW(saver_.save_as("empty.stillmap"), RefusedNow);
+  EXPECT_THROW(saver_.save_as("../city.stillmap"), std::invalid_argument);
 }
 
 TEST_F(DisplacedMapFile, OtherConnectionsOfStillmapAreNoStrangers) {

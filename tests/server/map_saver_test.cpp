@@ -225,7 +225,7 @@ TEST_F(MapSaverTest, NeedsAFileToSaveTo) {
   saver.set_source(source_);
   EXPECT_FALSE(saver.load());
   EXPECT_NO_THROW(saver.save_if_changed());
-  EXPECT_THROW(saver.save_as(""), std::invalid_argument);
+  EXPECT_THROW(saver.save_as(""), RefusedNow);
 }
 
 TEST_F(MapSaverTest, NamesOfOtherFilesAreRefused) {

@@ -140,16 +140,14 @@ class SqliteMapStore : public MapStore {
       if (has_first_schema(database_)) upgrade_schema(database_);
       index_tile_infos(database_);
       read_what_is_saved();
-      if (!log_is_empty_) empty_log("PASSIVE");
+      empty_log_before();
       if (!saved_tiles_) saved_tiles_ = read_tile_infos(database_);
       const bool was_alone = log_is_empty_;
       write_with_session(map, tiles_after(map));
       std::error_code no_log;
       log_bytes = fs::file_size(beside(file_, "-wal"), no_log);
       if (no_log) log_bytes = 0;
-      is_overwritten_ = watch_.has_own_name() && !watch_.is_own_content(was_alone);
-      if (is_overwritten_)
-        throw SQLite::Exception("another program wrote to the file", SQLITE_CORRUPT);
+      check_content(was_alone);
       // So that a copy of the file alone is a copy of the map.
       empty_log("TRUNCATE");
     });
@@ -190,7 +188,9 @@ class SqliteMapStore : public MapStore {
 
   void begin_run(std::uint64_t map_id, const RunSession& said) override {
     writing([&] {
-      if (!log_is_empty_) empty_log("PASSIVE");
+      forget_if_changed_by_others();
+      empty_log_before();
+      const bool was_alone = log_is_empty_;
       std::optional<GrowingSession> session = session_of_run(said);
       SQLite::Transaction transaction(database_, SQLite::TransactionBehavior::IMMEDIATE);
       SQLite::Statement rename(database_, "UPDATE map SET map_id = ?");
@@ -201,6 +201,7 @@ class SqliteMapStore : public MapStore {
       reopen.exec();
       commit(transaction);
       session_ = std::move(session);
+      check_content(was_alone);
       empty_log("TRUNCATE");
     });
   }
@@ -218,7 +219,10 @@ class SqliteMapStore : public MapStore {
   }
 
   void complete_file() override {
-    writing([&] { empty_log("TRUNCATE"); });
+    writing([&] {
+      check_fate();
+      empty_log("TRUNCATE");
+    });
     if (!log_is_empty_) {
       throw MapFileError(file_, "is being read by another program; try again when it has ended");
     }
@@ -250,6 +254,8 @@ class SqliteMapStore : public MapStore {
   MapFileFate fate() override {
     return is_overwritten_ ? MapFileFate::overwritten : watch_.fate(database_);
   }
+
+  bool is_same_under_name() override { return watch_.is_same_under_name(); }
 
   std::function<void()> abandon() override {
     sqlite3_db_config(database_.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
@@ -324,13 +330,40 @@ class SqliteMapStore : public MapStore {
     transaction.commit();
   }
 
+  /// Throws where the file has another content than this store left: the log is not written into
+  /// it. `was_alone`: all that was saved until the watch remembered was in the file.
+  void check_content(bool was_alone) {
+    is_overwritten_ |= watch_.has_own_name() && !watch_.is_own_content(was_alone);
+    refuse_overwritten();
+  }
+  /// The same when nothing was saved since the watch remembered.
+  void check_fate() {
+    is_overwritten_ |= watch_.fate(database_) == MapFileFate::overwritten;
+    refuse_overwritten();
+  }
+  void refuse_overwritten() const {
+    if (!is_overwritten_) return;
+    throw SQLite::Exception("another program wrote to the file", SQLITE_CORRUPT);
+  }
+
+  /// What earlier saves left in the log.
+  void empty_log_before() {
+    if (log_is_empty_) return;
+    check_fate();
+    empty_log("PASSIVE");
+  }
+
   /// Brings the log's content into the file, unless somebody reads what it still has without it.
   /// "PASSIVE" does not wait for them, "TRUNCATE" does for a while and leaves no log.
   void empty_log(const std::string& mode) {
     SQLite::Statement checkpoint(database_, "PRAGMA wal_checkpoint(" + mode + ")");
-    if (!checkpoint.executeStep()) return;
     const auto number = [&](int column) { return checkpoint.getColumn(column).getInt(); };
+    // Also where that is interrupted by an error.
+    watch_.set_partly_written(true);
+    if (!checkpoint.executeStep()) return;
     log_is_empty_ = number(0) == 0 && number(1) == number(2);
+    // A reader may keep all of the log out of the file, or all but its begin.
+    watch_.set_partly_written(number(1) != number(2) && number(2) > 0);
   }
 
   template <typename Action>

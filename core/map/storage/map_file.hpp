@@ -114,8 +114,11 @@ class MapStore {
   virtual void copy_to(const std::filesystem::path& file) = 0;
   /// The same to a name that no file has; false where one has it by then.
   [[nodiscard]] virtual bool copy_to_new(const std::filesystem::path& file) = 0;
-  /// Costs some reads of single pages.
+  /// Costs some reads of single pages. Throws MapFileError where the file cannot be looked at.
   [[nodiscard]] virtual MapFileFate fate() = 0;
+  /// Of one that was replaced: whether the file that has the name is a copy of its last state, or
+  /// itself, on a file system whose inode numbers change.
+  [[nodiscard]] virtual bool is_same_under_name() = 0;
   /// Before the store goes: what is in its log stays out of the file, which is somebody else's by
   /// now. Returns what removes the log's files when no connection of this process has them open any
   /// more, unless they are others by then.

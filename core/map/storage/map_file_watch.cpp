@@ -1,9 +1,12 @@
 #include "core/map/storage/map_file_watch.hpp"
 
 #include <SQLiteCpp/Exception.h>
+#include <fcntl.h>
 #include <sqlite3.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <system_error>
 #include <utility>
 
@@ -31,11 +34,46 @@ bool has_moved(SQLite::Database& database) {
   return result == SQLITE_OK && moved != 0;
 }
 
+/// Throws MapFileError for a fault: an I/O error, a network that is away.
+std::optional<FileState> checked(const fs::path& file, const std::optional<FileState>& state,
+                                 const std::error_code& fault) {
+  if (fault) {
+    throw MapFileError(file, "cannot be looked at (" + fault.message() +
+                                 "); nothing is written to it until it can");
+  }
+  return state;
+}
+
+std::optional<FileState> state_of_name(const fs::path& file) {
+  std::error_code fault;
+  const auto state = FileState::of(file, fault);
+  return checked(file, state, fault);
+}
+
 }  // namespace
 
+FileReference::FileReference(const fs::path& file)
+    : file_(file), descriptor_(::open(file.c_str(), O_PATH | O_CLOEXEC)) {
+  if (descriptor_ >= 0 || errno == ENOENT || errno == ENOTDIR) return;
+  checked(file, std::nullopt, std::error_code(errno, std::generic_category()));
+}
+
+FileReference::~FileReference() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+std::optional<FileState> FileReference::state() const {
+  if (descriptor_ < 0) return std::nullopt;
+  std::error_code fault;
+  const auto state = FileState::of(descriptor_, fault);
+  return checked(file_, state, fault);
+}
+
 MapFileWatch::MapFileWatch(fs::path file, SQLite::Database& database)
-    : file_(std::move(file)), opened_(FileState::of(file_)) {
-  if (has_moved(database)) opened_.reset();
+    : file_(std::move(file)),
+      opened_(file_),
+      was_moved_(has_moved(database)),
+      is_partly_written_(!has_empty_log()) {
   remember(database);
 }
 
@@ -52,28 +90,45 @@ void MapFileWatch::remember(SQLite::Database& database) {
 }
 
 MapFileFate MapFileWatch::fate(SQLite::Database& database) {
-  if (!FileState::of(file_)) return MapFileFate::removed;
+  if (!state_of_name(file_)) return MapFileFate::removed;
   if (!has_own_name()) return MapFileFate::replaced;
   try {
     // Another connection has saved there.
-    if (data_version(database) != data_version_) remember(database);
+    if (data_version(database) != data_version_) {
+      remember(database);
+      is_partly_written_ |= !has_empty_log();
+    }
   } catch (const SQLite::Exception&) {
     return MapFileFate::overwritten;
   }
   return is_own_content(has_empty_log()) ? MapFileFate::kept : MapFileFate::overwritten;
 }
 
-bool MapFileWatch::has_own_name() const { return is_same_file(FileState::of(file_), opened_); }
+bool MapFileWatch::has_own_name() const {
+  return !was_moved_ && is_same_file(state_of_name(file_), opened_.state());
+}
+
+bool MapFileWatch::is_same_under_name() const {
+  if (!marks_ || marks_->empty() || !has_empty_log()) return false;
+  const LastMark last = last_mark_without_log(file_);
+  return last.is_readable && last.mark == marks_->back();
+}
 
 bool MapFileWatch::is_own_content(bool is_alone) const {
   if (!marks_) return true;
   const LastMark last = last_mark_without_log(file_);
   if (is_alone) {
     const auto own = marks_->empty() ? std::nullopt : std::make_optional(marks_->back());
-    return last.is_readable && last.mark == own;
+    const bool is_last = last.is_readable && last.mark == own;
+    had_mark_ |= is_last && own.has_value();
+    return is_last;
   }
-  // A log may be written into the file in parts, while somebody reads it.
-  return !last.mark || std::ranges::find(*marks_, *last.mark) != marks_->end();
+  // While somebody reads, a log may be written into the file in parts.
+  if (!last.is_readable) return is_partly_written_;
+  if (!last.mark) return !had_mark_;
+  const bool is_own = std::ranges::find(*marks_, *last.mark) != marks_->end();
+  had_mark_ |= is_own;
+  return is_own;
 }
 
 bool MapFileWatch::has_empty_log() const {

@@ -14,7 +14,6 @@
 
 #include "core/map/storage/fresh_map_file.hpp"
 #include "core/map/storage/map_database.hpp"
-#include "core/map/storage/map_file.hpp"
 
 namespace stillmap {
 namespace {
@@ -51,7 +50,7 @@ bool may_live(const Holder& holder) {
   return holder.pid != ::getpid() && (::kill(holder.pid, 0) == 0 || errno == EPERM);
 }
 
-MapFileError held_by(const fs::path& map_file, const Holder& holder) {
+MapFileInUseError held_by(const fs::path& map_file, const Holder& holder) {
   const std::string who = holder.pid == 0 ? "another process"
                                           : "process " + std::to_string(holder.pid) +
                                                 " on the machine '" + holder.host + "'";

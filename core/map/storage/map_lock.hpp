@@ -2,7 +2,15 @@
 
 #include <filesystem>
 
+#include "core/map/storage/map_file.hpp"
+
 namespace stillmap {
+
+/// One that another process writes its map to.
+class MapFileInUseError : public MapFileError {
+ public:
+  using MapFileError::MapFileError;
+};
 
 /// Who writes a map file: one process at a time. The file "NAME.lock" beside it names the holder,
 /// as "host pid", and is locked (flock) as long as the holder lives: a lock that a killed process
@@ -10,8 +18,8 @@ namespace stillmap {
 /// that only read need none.
 class MapLock {
  public:
-  /// Throws MapFileError that names the holder, or when the lock file cannot be written or is
-  /// something else.
+  /// Throws MapFileInUseError that names the holder, or MapFileError when the lock file cannot be
+  /// written or is something else.
   explicit MapLock(const std::filesystem::path& map_file);
   ~MapLock();
   /// Whether its file still has its name: somebody may have removed it.

@@ -4,16 +4,40 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <csignal>
 #include <string>
 
 namespace stillmap {
 
+namespace {
+
+FileState state_of(const struct stat& facts) {
+  return {facts.st_dev, facts.st_ino, facts.st_size,
+          facts.st_mtim.tv_sec * 1'000'000'000 + facts.st_mtim.tv_nsec};
+}
+
+}  // namespace
+
 std::optional<FileState> FileState::of(const std::filesystem::path& file) {
+  std::error_code ignored;
+  return of(file, ignored);
+}
+
+std::optional<FileState> FileState::of(const std::filesystem::path& file, std::error_code& fault) {
+  fault.clear();
   struct stat facts {};
-  if (::stat(file.c_str(), &facts) != 0) return std::nullopt;
-  return FileState{facts.st_dev, facts.st_ino, facts.st_size,
-                   facts.st_mtim.tv_sec * 1'000'000'000 + facts.st_mtim.tv_nsec};
+  if (::stat(file.c_str(), &facts) == 0) return state_of(facts);
+  if (errno != ENOENT && errno != ENOTDIR) fault.assign(errno, std::generic_category());
+  return std::nullopt;
+}
+
+std::optional<FileState> FileState::of(int descriptor, std::error_code& fault) {
+  fault.clear();
+  struct stat facts {};
+  if (::fstat(descriptor, &facts) == 0) return state_of(facts);
+  fault.assign(errno, std::generic_category());
+  return std::nullopt;
 }
 
 std::optional<ReadLease> ReadLease::take(const std::filesystem::path& file) {

@@ -3,14 +3,20 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <system_error>
 #include <utility>
 
 namespace stillmap {
 
 /// Which file has a name, and what changes when it is written to.
 struct FileState {
-  /// Nothing where there is no such file.
+  /// Nothing where there is no such file, and where it cannot be looked at.
   [[nodiscard]] static std::optional<FileState> of(const std::filesystem::path& file);
+  /// The same, with `fault` for a file that may be there and cannot be looked at.
+  [[nodiscard]] static std::optional<FileState> of(const std::filesystem::path& file,
+                                                   std::error_code& fault);
+  /// Of an open file, as it is now.
+  [[nodiscard]] static std::optional<FileState> of(int descriptor, std::error_code& fault);
 
   std::uint64_t device = 0;
   std::uint64_t number = 0;
