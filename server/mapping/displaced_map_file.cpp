@@ -111,7 +111,6 @@ fs::path MapSaver::name_beside() const {
   const fs::path target = folder_.unused_file_for(left_file_.value_or(file_));
   std::error_code unknown;
   const std::uintmax_t bytes = fs::file_size(file_, unknown);
-  // The file that lies under the name counts too: whose it is does not matter.
   if (!has_ended_) folder_.check_room(file_, {}, unknown ? 0 : bytes);
   return target;
 }
