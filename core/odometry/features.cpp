@@ -14,7 +14,6 @@
 
 #include "core/lidar/voxel_index.hpp"
 #include "core/odometry/ring_order.hpp"
-#include "core/odometry/ring_tangents.hpp"
 #include "core/odometry/voxel_downsample.hpp"
 
 namespace stillmap {
@@ -257,7 +256,6 @@ Features extract_surfaces(const Scan& scan, const FeatureConfig& config) {
   features.is_level.resize(scan.size());
   for (const std::uint32_t i : features.surfaces)
     features.is_level[i] = !columns.stands_up(scan.points_lidar[i]);
-  if (!scan.ring.empty()) features.tangents = ring_tangents(scan, features.surfaces);
   const bool are_points_spaced = config.surface_spacing_m == map_point_spacing_m;
   pick_points(scan,
               are_points_spaced

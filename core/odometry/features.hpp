@@ -23,7 +23,7 @@ struct Features {
   std::vector<std::uint32_t> surfaces;
   /// Of every point of the scan, where it has surfaces: it is one, and on level ground.
   std::vector<bool> is_level;
-  /// ring_tangents() of the scan, for its surfaces, where it has rings.
+  /// ring_tangents() of the scan for its surfaces; empty where they are not looked at.
   std::vector<Eigen::Vector3f> tangents;
   /// Points of any kind, spread evenly: inserted into the local map for the alignment of points.
   std::vector<std::uint32_t> points;

@@ -8,6 +8,7 @@
 
 #include "core/odometry/object_clusters.hpp"
 #include "core/odometry/relocalization.hpp"
+#include "core/odometry/ring_tangents.hpp"
 #include "core/odometry/se3.hpp"
 
 namespace stillmap {
@@ -107,6 +108,9 @@ void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& predi
       return;
     }
     parts.features = extract_surfaces(parts.scan, config.features);
+    // A young map, or one that was made earlier, has too few other points to go by.
+    if (fits.are_known() && !parts.scan.ring.empty())
+      parts.features.tangents = ring_tangents(parts.scan, parts.features.surfaces);
     if (prediction.is_known && fits.are_known())
       parts.few_surfaces = few_surfaces(parts.scan, config.features, parts.features);
   };

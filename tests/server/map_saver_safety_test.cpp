@@ -215,22 +215,6 @@ TEST_F(MapSaverSafetyTest, AFileHasOneLockWhateverItsNames) {
   EXPECT_EQ(tile_in(file_), 1);
 }
 
-TEST_F(MapSaverSafetyTest, AnIdleRunLeavesTheMapItsId) {
-  save_far_map("city.stillmap");
-  std::uint64_t map_id = 0;
-  for (int run = 0; run < 3; ++run) {
-    MapSaver saver = this->saver();
-    saver.set_source(source_);
-    const SavedMap stored = *saver.load();
-    if (run > 1) {
-      EXPECT_EQ(stored.view.map_id, map_id);
-    }
-    map_id = stored.view.map_id;
-    prepare_(stored, nullptr)();
-    saver.save_at_end();
-  }
-}
-
 TEST_F(MapSaverSafetyTest, TheLockOfTheDeadIsTakenOver) {
   std::ofstream(folder_ / "city.stillmap.lock") << "elsewhere 4711\n";
   MapSaver saver = this->saver();
