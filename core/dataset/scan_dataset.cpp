@@ -16,6 +16,7 @@
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/point_cloud_files.hpp"
 #include "core/lidar/point_fields.hpp"
+#include "core/lidar/ring_numbering.hpp"
 #include "core/lidar/sensor_fit.hpp"
 
 namespace stillmap {
@@ -159,7 +160,7 @@ SensorModel guess_sensor(const Scan& scan, bool kitti_file) {
     return is_part_of_kitti ? hdl_64e() : *std::move(sensor);
   }
   if (!scan.ring.empty()) {
-    const int rings = *std::ranges::max_element(scan.ring) + 1;
+    const int rings = ring_numbering(scan).rings;
     return rings <= 16 ? vlp_16() : (rings <= 32 ? hdl_32e() : hdl_64e());
   }
   constexpr double just_above_vlp_16 = 16.0 * std::numbers::pi / 180.0;

@@ -8,6 +8,8 @@
 #include <span>
 #include <utility>
 
+#include "core/lidar/ring_numbering.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -145,22 +147,25 @@ bool numbered_from_top(const Scan& scan) {
   return products * count <= rings * slopes;
 }
 
-std::vector<std::uint16_t> rings_from_field(const Scan& scan, const SensorModel& sensor) {
+std::vector<std::uint16_t> rings_from_field(const Scan& scan, const SensorModel& sensor,
+                                            const RingNumbering& numbering) {
   std::vector<std::uint16_t> rings = scan.ring;
-  if (numbered_from_top(scan)) return rings;
+  const bool is_from_top = numbered_from_top(scan);
   const auto last = static_cast<std::uint16_t>(sensor.rings - 1);
-  for (auto& ring : rings) ring = static_cast<std::uint16_t>(last - ring);
+  for (auto& ring : rings) {
+    ring = numbering.ring_of_number[ring];
+    if (!is_from_top) ring = static_cast<std::uint16_t>(last - ring);
+  }
   return rings;
 }
 
-bool field_fits(const Scan& scan, const SensorModel& sensor) {
-  if (scan.ring.size() != scan.size()) return false;
+bool tells_rings(const Scan& scan, const SensorModel& sensor) {
+  if (scan.ring.empty() || scan.ring.size() != scan.size()) return false;
   // Converters that do not know the ring write the same number, 0, into all points.
   const bool tells_nothing =
       sensor.rings > 1 && scan.size() > 1 &&
       std::ranges::all_of(scan.ring, [&](std::uint16_t ring) { return ring == scan.ring[0]; });
-  return !tells_nothing &&
-         std::ranges::all_of(scan.ring, [&](std::uint16_t ring) { return ring < sensor.rings; });
+  return !tells_nothing;
 }
 
 }  // namespace
@@ -201,7 +206,10 @@ std::vector<std::uint16_t> rings_from_order(const Scan& scan, const SensorModel&
 }
 
 std::vector<std::uint16_t> assign_rings(const Scan& scan, const SensorModel& sensor) {
-  if (!scan.ring.empty() && field_fits(scan, sensor)) return rings_from_field(scan, sensor);
+  if (tells_rings(scan, sensor)) {
+    if (const auto numbering = ring_numbering(scan, sensor))
+      return rings_from_field(scan, sensor, *numbering);
+  }
   if (sensor.ring_source == RingSource::order) {
     if (auto rings = rings_from_order(scan, sensor); !rings.empty()) return rings;
   }

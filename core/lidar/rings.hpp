@@ -11,9 +11,10 @@ namespace stillmap {
 /// The beam of every point, 0 = highest and below `sensor.rings`.
 ///
 /// From the scan's ring field when it has one (reversed when its numbers rise from the bottom, as
-/// Velodyne's drivers count), else as `sensor.ring_source` says. A field that cannot be this
-/// sensor's, and an order that is not ring after ring, fall back to the elevation. Points between
-/// or outside the beams get the nearest one; points that are not finite get ring 0.
+/// Velodyne's drivers count, and whichever numbers it uses: RingNumbering), else as
+/// `sensor.ring_source` says. A field that cannot be this sensor's, and an order that is not ring
+/// after ring, fall back to the elevation. Points between or outside the beams get the nearest one;
+/// points that are not finite get ring 0.
 [[nodiscard]] std::vector<std::uint16_t> assign_rings(const Scan& scan, const SensorModel& sensor);
 
 /// The nearest beam of every point by its elevation alone.

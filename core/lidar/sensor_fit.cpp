@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/lidar/ring_numbering.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -40,44 +42,22 @@ double median_of(std::vector<double>& values) {
   return *middle;
 }
 
-/// Whether each number, from 0 to the highest one, stands in the scan's ring field.
-std::vector<bool> ring_numbers(const Scan& scan) {
-  std::vector<bool> stands(std::size_t{*std::ranges::max_element(scan.ring)} + 1, false);
-  for (const std::uint16_t ring : scan.ring) stands[ring] = true;
-  return stands;
-}
-
-/// Takes the numbers out that are no rings: those before the first one that stands in the field
-/// (which may count from 1), and where a third of the others does not stand there either, all of
-/// these, since the field skips numbers. Else they are rings that have just seen nothing.
-void take_out_unused(const std::vector<bool>& stands, std::vector<double>& elevations) {
-  const auto first = std::ranges::find(stands, true) - stands.begin();
-  const std::ptrdiff_t used = std::ranges::count(stands, true);
-  const bool skips = 3 * used < 2 * (std::ssize(stands) - first);
-  std::vector<double> kept;
-  for (std::ptrdiff_t i = first; i < std::ssize(stands); ++i) {
-    const auto ring = static_cast<std::size_t>(i);
-    if (stands[ring] || !skips) kept.push_back(elevations[ring]);
-  }
-  elevations = std::move(kept);
-}
-
 /// Median elevation of every ring, NAN for rings with too few points, in the field's own order.
 /// Empty for a field of more rings than a sensor can have, which is something else.
 std::vector<double> ring_elevations(const Scan& scan) {
-  constexpr std::size_t max_rings = 256;
-  const std::vector<bool> stands = ring_numbers(scan);
-  if (stands.size() > max_rings) return {};
-  std::vector<std::vector<double>> of_ring(stands.size());
+  constexpr int max_rings = 256;
+  const RingNumbering numbering = ring_numbering(scan);
+  if (numbering.rings > max_rings) return {};
+  std::vector<std::vector<double>> of_ring(static_cast<std::size_t>(numbering.rings));
   for (std::size_t i = 0; i < scan.size(); ++i) {
     const double elevation = elevation_of(scan.points_lidar[i]);
-    if (std::isfinite(elevation)) of_ring[scan.ring[i]].push_back(elevation);
+    if (std::isfinite(elevation))
+      of_ring[numbering.ring_of_number[scan.ring[i]]].push_back(elevation);
   }
   std::vector<double> elevations;
   for (auto& values : of_ring) {
     elevations.push_back(values.size() < min_points_on_ring ? NAN : median_of(values));
   }
-  take_out_unused(stands, elevations);
   return elevations;
 }
 
@@ -287,15 +267,12 @@ std::optional<SensorModel> fit_sensor(const Scan& scan) {
 }
 
 std::string sensor_mismatch(const Scan& scan, const SensorModel& sensor) {
-  if (!scan.ring.empty()) {
-    // A field may count from 1, or skip numbers.
-    const std::vector<bool> stands = ring_numbers(scan);
-    const std::ptrdiff_t rings = std::ranges::count(stands, true);
-    if (rings > sensor.rings) {
-      return "the cloud's ring field reaches " + std::to_string(stands.size() - 1) + " (" +
-             std::to_string(rings) + " rings), but sensor " + sensor.name + " has only " +
-             std::to_string(sensor.rings) + " rings";
-    }
+  const RingNumbering numbering = ring_numbering(scan);
+  // The same number in all points tells nothing.
+  if (numbering.numbers > 1 && numbering.rings > sensor.rings && !ring_numbering(scan, sensor)) {
+    return "the cloud's ring field reaches " + std::to_string(numbering.highest_number()) + " (" +
+           std::to_string(numbering.numbers) + " rings), but sensor " + sensor.name + " has only " +
+           std::to_string(sensor.rings) + " rings";
   }
   const std::vector<double> elevations = sorted_elevations(scan);
   if (elevations.size() < min_points / 10) return {};

@@ -289,6 +289,20 @@ TEST(ScanDataset, APartialFirstScanAndADamagedOneDoNotDecideWhichSensorItWas) {
   EXPECT_THROW(ScanDataset(folder.path() / "sequence"), DatasetError);
 }
 
+TEST(ScanDataset, CountsTheRingsOfAScanOfFewPointsFromTheFirstThatItHas) {
+  const ScratchFolder folder;
+  Scan few;
+  const Scan whole = ringed_scan(vlp_16(), 0, 0);
+  for (std::size_t i = 0; i < whole.size(); i += 7) {
+    few.points_lidar.push_back(whole.points_lidar[i]);
+    few.ring.push_back(static_cast<std::uint16_t>(whole.ring[i] + 1));
+    few.intensity.push_back(0.5F);
+  }
+  ASSERT_LT(few.size(), 1000U) << "else the elevations tell the sensor";
+  KittiSequenceWriter(folder.path() / "sequence").add(few, {}, pose_at(0, 0.0));
+  EXPECT_EQ(ScanDataset(folder.path() / "sequence").suggested_sensor().name, "VLP-16");
+}
+
 TEST(ScanDataset, FilesAsKittisWithoutRingsAreOfTheLidarThatTheirPointsTell) {
   const ScratchFolder folder;
   const auto suggested = [&](Scan scan) {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 #include <random>
+#include <utility>
 
 namespace stillmap {
 namespace {
@@ -156,6 +157,58 @@ TEST(AssignRings, ReversesAFieldThatCountsFromTheBottom) {
     ringed.scan.ring.push_back(static_cast<std::uint16_t>(15 - ring));
   }
   EXPECT_EQ(assign_rings(ringed.scan, vlp_16()), ringed.truth);
+}
+
+/// Beams that leave so far beside their place that the elevation alone takes them for others.
+RingedScan blurred(const SensorModel& sensor) {
+  RingedScan ringed = ring_after_ring(sensor, {});
+  std::mt19937 random(3);
+  std::normal_distribution<float> blur(0.0F, 0.02F);
+  for (Eigen::Vector3f& p : ringed.scan.points_lidar) p.z() += blur(random) * p.head<2>().norm();
+  return ringed;
+}
+
+/// A ring field of 16 rings.
+std::vector<std::uint16_t> numbered(const std::vector<std::uint16_t>& rings, bool from_top,
+                                    int step, int first) {
+  std::vector<std::uint16_t> numbers;
+  for (const int ring : rings)
+    numbers.push_back(static_cast<std::uint16_t>(step * (from_top ? ring : 15 - ring) + first));
+  return numbers;
+}
+
+TEST(AssignRings, TakesAFieldThatCountsFromOneOrSkipsNumbers) {
+  for (const bool from_top : {true, false}) {
+    for (const auto& [step, first] : {std::pair{1, 1}, {4, 3}, {2, 0}, {2, 2}}) {
+      RingedScan ringed = blurred(vlp_16());
+      ASSERT_GT(share_wrong(assign_rings(ringed.scan, vlp_16()), ringed.truth), 0.1);
+      ringed.scan.ring = numbered(ringed.truth, from_top, step, first);
+      EXPECT_EQ(assign_rings(ringed.scan, vlp_16()), ringed.truth)
+          << "every " << step << " from " << first << (from_top ? ", from the top" : "");
+    }
+  }
+}
+
+TEST(AssignRings, TakesAFieldOfWhichEdgeRingsSawNothing) {
+  const std::ptrdiff_t one_ring = 720;
+  for (const bool from_top : {true, false}) {
+    for (const int first : {0, 1}) {
+      for (const bool cut_top : {true, false}) {
+        RingedScan ringed = blurred(vlp_16());
+        ringed.scan.ring = numbered(ringed.truth, from_top, 1, first);
+        const auto cut = [&](auto& values) {
+          const auto begin = cut_top ? values.begin() : values.end() - one_ring;
+          values.erase(begin, begin + one_ring);
+        };
+        cut(ringed.scan.points_lidar);
+        cut(ringed.scan.ring);
+        cut(ringed.truth);
+        EXPECT_EQ(assign_rings(ringed.scan, vlp_16()), ringed.truth)
+            << "from " << first << (from_top ? ", from the top" : "")
+            << (cut_top ? ", top cut" : ", bottom cut");
+      }
+    }
+  }
 }
 
 TEST(AssignRings, DoesNotBelieveAFieldOfAnotherSensor) {

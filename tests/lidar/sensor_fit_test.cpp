@@ -246,6 +246,23 @@ TEST(SensorRecognition, LearnsOfMoreRingsAndAWiderFieldOfView) {
             0U);
 }
 
+TEST(SensorRecognition, TellsALidarNumberedFromTheTopOnceThoughItsHighestRingsSawNothing) {
+  SensorModel wide;
+  wide.rings = 64;
+  wide.fov_up = 45.0 * degree;
+  wide.fov_down = -45.0 * degree;
+  const auto from_top = [](int ring) { return 63 - ring; };
+  SensorRecognition recognition;
+  int times_told = 0;
+  for (const int missing : {9, 8, 6, 4, 2, 0})
+    times_told += recognition.learn(renumbered(lower_rings_of(wide, missing), from_top)) ? 1 : 0;
+  EXPECT_EQ(times_told, 1);
+  ASSERT_EQ(recognition.sensor()->rings, 64);
+  for (int ring = 0; ring < 64; ++ring)
+    EXPECT_NEAR(recognition.sensor()->beam_elevation(ring), wide.beam_elevation(ring),
+                0.05 * degree);
+}
+
 TEST(SensorMismatch, NamesWhatDoesNotFit) {
   SensorModel wide;
   wide.rings = 128;
