@@ -66,8 +66,12 @@ std::optional<float> mean_intensity(std::span<const Scan> parts) {
 
 bool is_labelled(const Scan& scan) { return has_known_class(scan.labels); }
 
-bool are_partly_labelled(std::span<const Scan> parts) {
-  return std::ranges::any_of(parts, is_labelled) && !std::ranges::all_of(parts, is_labelled);
+/// Whether one brings labels, and another one points of a lidar that sends none.
+bool are_partly_labelled(std::span<const Scan> parts, const std::vector<bool>& sends_labels) {
+  bool is_any_unlabelled = false;
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    is_any_unlabelled |= !parts[i].empty() && !is_labelled(parts[i]) && !sends_labels[i];
+  return is_any_unlabelled && std::ranges::any_of(parts, is_labelled);
 }
 
 }  // namespace
@@ -119,6 +123,13 @@ void move_points(Scan& scan, const Eigen::Isometry3d& T_new_old) {
 }
 
 Scan merged_scan(std::vector<Scan> parts, PartialLabels partial_labels) {
+  const std::vector<bool> sends_labels(parts.size(), false);
+  return merged_scan(std::move(parts), sends_labels, partial_labels);
+}
+
+Scan merged_scan(std::vector<Scan> parts, const std::vector<bool>& sends_labels,
+                 PartialLabels partial_labels) {
+  assert(sends_labels.size() == parts.size());
   Scan merged;
   if (parts.empty()) return merged;
   merged.stamp_ns = std::ranges::min(parts, {}, &Scan::stamp_ns).stamp_ns;
@@ -126,8 +137,9 @@ Scan merged_scan(std::vector<Scan> parts, PartialLabels partial_labels) {
     return part.stamp_ns != merged.stamp_ns || !part.time_offset_s.empty();
   });
   const std::optional<float> usual_intensity = mean_intensity(parts);
-  const bool has_labels = std::ranges::any_of(parts, is_labelled) &&
-                          (partial_labels == PartialLabels::keep || !are_partly_labelled(parts));
+  const bool has_labels =
+      std::ranges::any_of(parts, is_labelled) &&
+      (partial_labels == PartialLabels::keep || !are_partly_labelled(parts, sends_labels));
   for (Scan& part : parts) {
     const auto later_s = static_cast<float>(seconds(part.stamp_ns - merged.stamp_ns));
     for (float& time_s : part.time_offset_s) time_s += later_s;
@@ -145,10 +157,12 @@ SweepMerger::SweepMerger(const Config& config)
     : config_(config),
       lidars_(config.lidars),
       is_silent_(config.lidars, false),
+      sends_labels_(config.lidars, false),
       rhythms_(config.lidars) {}
 
 std::size_t SweepMerger::add(std::size_t lidar, Scan scan, double now_s) {
   is_silent_[lidar] = false;
+  if (is_labelled(scan)) sends_labels_[lidar] = true;
   Rhythm& rhythm = rhythms_[lidar];
   rhythm = {.newest_ns = scan.stamp_ns,
             .step_ns = rhythm.newest_ns ? scan.stamp_ns - *rhythm.newest_ns : 0,
@@ -209,10 +223,12 @@ std::optional<SweepMerger::Sweep> SweepMerger::next(double now_s) {
   for (std::size_t lidar = 0; lidar < lidars_.size(); ++lidar)
     if (waits_for(lidar, reference, now_s)) return std::nullopt;
   std::vector<Scan> parts;
+  std::vector<bool> sends_labels;
   Sweep sweep;
   for (std::size_t lidar = 0; lidar < lidars_.size(); ++lidar) {
     if (is_in_sweep(lidar, stamp_ns)) {
       parts.push_back(std::move(lidars_[lidar].front().scan));
+      sends_labels.push_back(sends_labels_[lidar]);
       lidars_[lidar].pop_front();
       continue;
     }
@@ -222,8 +238,8 @@ std::optional<SweepMerger::Sweep> SweepMerger::next(double now_s) {
     if (is_missing) sweep.missing.push_back(lidar);
   }
   last_stamp_ns_ = stamp_ns;
-  sweep.is_partly_labelled = are_partly_labelled(parts);
-  sweep.scan = merged_scan(std::move(parts), config_.partial_labels);
+  sweep.is_partly_labelled = are_partly_labelled(parts, sends_labels);
+  sweep.scan = merged_scan(std::move(parts), sends_labels, config_.partial_labels);
   return sweep;
 }
 

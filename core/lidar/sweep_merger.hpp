@@ -44,6 +44,10 @@ enum class PartialLabels : std::uint8_t {
 /// merged frame.
 [[nodiscard]] Scan merged_scan(std::vector<Scan> parts,
                                PartialLabels partial_labels = PartialLabels::keep);
+/// `sends_labels`: of each part, whether its lidar is known to send labels, so that a scan of
+/// points that have no class is no scan without labels.
+[[nodiscard]] Scan merged_scan(std::vector<Scan> parts, const std::vector<bool>& sends_labels,
+                               PartialLabels partial_labels);
 
 /// Sorts the scans of several lidars into sweeps: scans whose stamps lie less than half a period
 /// apart, one of each lidar. Reads no clock: the caller says when a scan arrived.
@@ -61,7 +65,7 @@ class SweepMerger {
     Scan scan;
     /// Lidars that sent nothing in time, but for those that were not due.
     std::vector<std::size_t> missing;
-    /// Some lidars sent labels, others did not.
+    /// Some lidars sent labels, others never did.
     bool is_partly_labelled = false;
   };
 
@@ -118,6 +122,8 @@ class SweepMerger {
   /// In the order of arrival.
   std::vector<std::deque<Waiting>> lidars_;
   std::vector<bool> is_silent_;
+  /// Lidars of which a point had a class.
+  std::vector<bool> sends_labels_;
   std::vector<Rhythm> rhythms_;
   std::optional<std::int64_t> last_stamp_ns_;
 };

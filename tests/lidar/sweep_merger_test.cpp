@@ -68,10 +68,21 @@ TEST(MergedScan, LeavesLabelsOfSomeLidarsOutWhereAskedTo) {
   unfilled.labels = {SemanticClass::unlabeled};
   const auto drop = PartialLabels::drop;
   EXPECT_THAT(merged_scan({labelled, scan_at(1000, 2.0F)}, drop).labels, IsEmpty());
-  EXPECT_THAT(merged_scan({labelled, unfilled}, drop).labels, IsEmpty());
   EXPECT_THAT(merged_scan({unfilled, unfilled}, drop).labels, IsEmpty());
   EXPECT_THAT(merged_scan({labelled, labelled}, drop).labels,
               ElementsAre(SemanticClass::car, SemanticClass::car));
+}
+
+TEST(MergedScan, KeepsLabelsBesideAScanOfNoPointsOrOfPointsThatNobodyKnows) {
+  Scan labelled = scan_at(1000, 1.0F);
+  labelled.labels = {SemanticClass::car};
+  Scan unknown = scan_at(1000, 2.0F);
+  unknown.labels = {SemanticClass::unlabeled};
+  const auto drop = PartialLabels::drop;
+  EXPECT_THAT(merged_scan({labelled, Scan{}}, drop).labels, ElementsAre(SemanticClass::car));
+  EXPECT_THAT(merged_scan({labelled, unknown}, std::vector{true, true}, drop).labels,
+              ElementsAre(SemanticClass::car, SemanticClass::unlabeled));
+  EXPECT_THAT(merged_scan({labelled, unknown}, std::vector{true, false}, drop).labels, IsEmpty());
 }
 
 TEST(MergedScan, OfNothingIsEmpty) { EXPECT_TRUE(merged_scan({}).empty()); }
@@ -143,6 +154,23 @@ TEST_F(Merger, TellsThatOnlySomeLidarsSendLabels) {
   ASSERT_TRUE(sweep);
   EXPECT_TRUE(sweep->is_partly_labelled);
   EXPECT_THAT(sweep->scan.labels, ElementsAre(SemanticClass::car, SemanticClass::unlabeled));
+}
+
+TEST(SweepMerger, RemembersWhichLidarsSendLabels) {
+  SweepMerger merger({.lidars = 2, .partial_labels = PartialLabels::drop});
+  const auto sweep_of = [&](std::int64_t stamp_ms, SemanticClass front, SemanticClass rear) {
+    Scan scans[] = {scan_at(stamp_ms, 1.0F), scan_at(stamp_ms, 2.0F)};
+    scans[0].labels = {front};
+    scans[1].labels = {rear};
+    EXPECT_EQ(merger.add(0, scans[0], 0.0) + merger.add(1, scans[1], 0.0), 0U);
+    return merger.next(0.0).value();
+  };
+  constexpr auto unknown = SemanticClass::unlabeled, car = SemanticClass::car;
+  EXPECT_TRUE(sweep_of(1000, car, unknown).is_partly_labelled) << "a field that nobody fills";
+  EXPECT_FALSE(sweep_of(1100, car, car).is_partly_labelled);
+  const auto sweep = sweep_of(1200, car, unknown);
+  EXPECT_FALSE(sweep.is_partly_labelled) << "it stands before a thing that has no class";
+  EXPECT_THAT(sweep.scan.labels, ElementsAre(car, unknown));
 }
 
 TEST_F(Merger, PairsScansByStampNotByArrival) {
