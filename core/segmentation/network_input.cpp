@@ -4,6 +4,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <optional>
 
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/surface_slope.hpp"
@@ -11,28 +12,49 @@
 namespace stillmap {
 namespace {
 
-/// The part of `factor`, which would bring a scan to the usual brightness, that is applied: nothing
-/// of one that scans of the training set's own lidar may need, all of one that only another scale
-/// needs, and between them the more the greater it is. A lidar may lie anywhere between them, and
-/// from scan to scan on either side of any step.
-float applied_part(float factor) {
-  constexpr float usual_factor = 1.2F, other_scale_factor = 3.0F;
-  const float share = std::log(std::max(factor, 1.0F / factor) / usual_factor) /
-                      std::log(other_scale_factor / usual_factor);
-  return std::pow(factor, std::clamp(share, 0.0F, 1.0F));
-}
+/// How a scan's intensity is brought towards the scale of the training set. A lidar may lie
+/// anywhere between the two scales, and from scan to scan on either side of any step: it goes over
+/// steadily.
+class RemissionScale {
+ public:
+  /// `factor` would bring the scan to the usual brightness. Nothing of one is applied that scans of
+  /// the training set's own lidar may need, all of one that only another scale needs, and between
+  /// them the more the greater it is.
+  explicit RemissionScale(float factor)
+      : share_(std::clamp(std::log(std::max(factor, 1.0F / factor) / usual_factor) /
+                              std::log(other_scale_factor / usual_factor),
+                          0.0F, 1.0F)),
+        factor_(std::pow(factor, share_)) {}
 
-/// The factor that brings a scan's intensity towards the scale of the training set: 1 where its
-/// bright points are about as bright. 0 where all points are alike, as where a driver fills the
-/// field with zeros: it tells nothing.
-float remission_factor(std::span<const float> intensity, const InputStatistics& statistics) {
+  /// Of another scale, retro-reflectors would be brighter than anything that was learned: they are
+  /// cut there, by the same share between, and not where nothing is applied. NaN stays.
+  [[nodiscard]] float applied_to(float intensity) const {
+    const float scaled = factor_ * intensity;
+    return scaled > max_remission ? max_remission * std::pow(scaled / max_remission, 1.0F - share_)
+                                  : scaled;
+  }
+
+ private:
+  static constexpr float usual_factor = 1.2F, other_scale_factor = 3.0F;
+  /// Scans of the usual scale have no more.
+  static constexpr float max_remission = 1.0F;
+
+  float share_;
+  float factor_;
+};
+
+/// The scale of a scan's intensity, told by its bright points. Nothing where all points are alike,
+/// as where a driver fills the field with zeros: it tells nothing.
+std::optional<RemissionScale> remission_scale(std::span<const float> intensity,
+                                              const InputStatistics& statistics) {
   constexpr std::size_t samples = 4096, min_points = 1000;
-  if (intensity.size() < min_points) return 1.0F;
+  if (intensity.empty()) return std::nullopt;
+  if (intensity.size() < min_points) return RemissionScale(1.0F);
   std::vector<float> sample;
   const std::size_t step = intensity.size() / samples + 1;
   for (std::size_t i = 0; i < intensity.size(); i += step)
     if (std::isfinite(intensity[i])) sample.push_back(intensity[i]);
-  if (sample.empty()) return 0.0F;
+  if (sample.empty()) return std::nullopt;
   const auto at_share = [&sample](std::size_t percent) {
     const auto place =
         sample.begin() + static_cast<std::ptrdiff_t>((sample.size() - 1) * percent / 100);
@@ -40,15 +62,12 @@ float remission_factor(std::span<const float> intensity, const InputStatistics& 
     return *place;
   };
   const float dark = at_share(10), bright = at_share(90);
-  if (bright <= dark || bright <= 0.0F) return 0.0F;
+  if (bright <= dark || bright <= 0.0F) return std::nullopt;
   // The same share of a normal distribution.
   constexpr std::size_t remission = index(InputChannel::remission);
   const float usual = statistics.mean[remission] + 1.28F * statistics.deviation[remission];
-  return usual > 0.0F ? applied_part(usual / bright) : 1.0F;
+  return RemissionScale(usual > 0.0F ? usual / bright : 1.0F);
 }
-
-/// Scans of the usual scale have no more.
-constexpr float max_remission = 1.0F;
 
 }  // namespace
 
@@ -64,8 +83,7 @@ std::vector<float> make_network_input(std::span<const Eigen::Vector3f> points,
   assert(intensity.empty() || intensity.size() == points.size());
   const std::size_t pixels = image.pixel_count();
   const InputStatistics& statistics = model.statistics;
-  const float factor = remission_factor(intensity, statistics);
-  const bool has_remission = !intensity.empty() && factor > 0.0F;
+  const std::optional<RemissionScale> scale = remission_scale(intensity, statistics);
   const bool has_slope = statistics.channels > index(InputChannel::slope);
   const std::vector<float> slope_rad =
       has_slope ? surface_slope_rad(image, points) : std::vector<float>();
@@ -75,11 +93,8 @@ std::vector<float> make_network_input(std::span<const Eigen::Vector3f> points,
     if (nearest == RangeImage::none || (model.mask_first_point && nearest == 0)) continue;
     const auto point = static_cast<std::size_t>(nearest);
     const Eigen::Vector3f& p = points[point];
-    // Of another scale, retro-reflectors would be brighter than anything that was learned. NaN
-    // stays.
-    const float remission = !has_remission   ? statistics.mean[index(InputChannel::remission)]
-                            : factor == 1.0F ? intensity[point]
-                                             : std::min(factor * intensity[point], max_remission);
+    const float remission = scale ? scale->applied_to(intensity[point])
+                                  : statistics.mean[index(InputChannel::remission)];
     const std::array<float, max_input_channels> values{
         image.range_m()[pixel], p.x(),     p.y(),
         p.z() + raised_m,       remission, has_slope ? slope_rad[pixel] : 0.0F};

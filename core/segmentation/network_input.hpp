@@ -13,7 +13,8 @@ namespace stillmap {
 /// nearest point and, for models that take it, the slope of the surface there, as (value - mean) /
 /// deviation; all 0 in an empty pixel. Without intensity, or with one that is the same everywhere,
 /// the remission is 0, the mean. An intensity whose 90th percentile is beyond a factor of 3 of the
-/// training set's is scaled to it. `image` is the scan's.
+/// training set's is scaled to it and cut at 1; within a factor of 1.2 it stays, and between them
+/// both are done in part. `image` is the scan's.
 [[nodiscard]] std::vector<float> make_network_input(const Scan& scan, const RangeImage& image,
                                                     const ModelDescription& model);
 /// The same of a scan whose points are turned to other axes; `image` is that of the scan as it was

@@ -154,6 +154,29 @@ TEST(NetworkInput, RetroReflectorsOfAnotherScaleAreNoBrighterThanThoseOfTheUsual
   EXPECT_GT(bright, 3);
 }
 
+TEST(NetworkInput, ARetroReflectorChangesLittleWithTheBrightnessOfItsScan) {
+  Scan scan = random_scan(3000, 2);
+  const RangeImage image = project(scan, model);
+  const auto seen = static_cast<std::size_t>(image.pixel_of_point()[0]);
+  const auto nearest = static_cast<std::size_t>(image.nearest()[seen]);
+  const float mean = model.statistics.mean[4], deviation = model.statistics.deviation[4];
+  const float usual = (mean + 1.28F * deviation) / 0.9F;
+  const auto remission = [&](float factor) {
+    Scan scaled = scan;
+    for (float& intensity : scaled.intensity) intensity *= factor * usual;
+    scaled.intensity[nearest] = 5.0F * factor;
+    return make_network_input(scaled, image, model)[4 * pixels + seen] * deviation + mean;
+  };
+  EXPECT_NEAR(remission(1.1F), 5.5F, 1e-3F) << "of the usual scale it stays as it is";
+  float last = remission(1.0F);
+  for (float factor = 0.98F; factor > 0.2F; factor *= 0.98F) {
+    const float now = remission(factor);
+    EXPECT_NEAR(now / last, 1.0F, 0.1F) << "factor " << factor;
+    last = now;
+  }
+  EXPECT_LE(last, 1.0001F);
+}
+
 TEST(NetworkInput, IntensityThatIsTheSameEverywhereIsNone) {
   Scan scan = random_scan(3000, 2);
   const RangeImage image = project(scan, model);
