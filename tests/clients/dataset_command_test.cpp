@@ -141,6 +141,24 @@ TEST_F(DatasetCommandTest, PointsOfKittisLidarAreWrittenAsTheyAreAndCorrectedOnc
   }
 }
 
+TEST_F(DatasetCommandTest, RefusesToExportWithAFileOfSeveralLidars) {
+  simulate("city", 2);
+  const auto lidar = [](const std::string& name, const std::string& x_m) {
+    return "{name: " + name + ", topic: " + name + "/points, sensor: vlp_16, xyz_m: [" + x_m +
+           ", 0, 1], rpy_deg: [0, 0, 0]}";
+  };
+  write("server.yaml", "frames: {base: base_link}\nsensors: [" + lidar("front", "1") + ", " +
+                           lidar("rear", "-1") + "]\n");
+  const std::string to_copy = "dataset export " + path("city") + " " + path("copy") +
+                              " --labels none --config " + path("server.yaml");
+  const ProcessResult refused = run(to_copy);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("server.yaml"), HasSubstr("'sensors'")));
+  EXPECT_FALSE(exists("copy"));
+  ASSERT_EQ(run(to_copy + " --sensor vlp_16").exit_code, 0);
+  EXPECT_EQ(ScanDataset(path("copy")).size(), 2U);
+}
+
 TEST_F(DatasetCommandTest, DoesNotWriteOverAnythingUnlessForced) {
   simulate("city", 2);
   const std::string to_copy = "dataset export " + path("city") + " " + path("copy");

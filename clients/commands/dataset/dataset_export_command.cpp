@@ -73,7 +73,16 @@ void write_sensor(const std::string& folder, const std::optional<SensorModel>& n
               std::filesystem::path(folder) / "sensor.yaml");
 }
 
+/// Nobody could read a sensor.yaml of several lidars that make one scan.
+void require_one_lidar(const std::string& config_file) {
+  if (config_file.empty() || load_server_config(config_file).lidars.empty()) return;
+  throw std::invalid_argument(config_file +
+                              " lists several lidars ('sensors'), but a sequence is of one: give a "
+                              "file with 'sensor', or name the lidar with --sensor");
+}
+
 ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopSignal& stop) {
+  if (arguments.mapper.sensor.empty()) require_one_lidar(arguments.mapper.config_file);
   const ScanDataset dataset =
       open_recording(arguments.source, arguments.recording, arguments.mapper.config_file);
   // They are copied, whatever --labels says.
