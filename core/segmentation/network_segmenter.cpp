@@ -173,7 +173,10 @@ PointLabels NetworkSegmenter::segment_with(SegmentationNetwork& network, int col
   ProjectionModel projection = model_.projection();
   if (model_.follow_sensor) projection = tilt.widened(projection);
   projection.columns = columns;
-  const RangeImage image(tilt.turns_image() ? points : scan.points_lidar, projection);
+  // An image of fixed size is that of the published projection: what a turned one shows would not
+  // fit into its field of view.
+  const bool turns_image = model_.follow_sensor && tilt.turns_image();
+  const RangeImage image(turns_image ? points : scan.points_lidar, projection);
   PixelOutputs outputs =
       network.run(make_network_input(points, scan.intensity, image, model_, raised_m(mount)));
   const PixelLabels pixels = pixel_labels(std::move(outputs), model_);

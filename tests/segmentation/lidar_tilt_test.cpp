@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "core/segmentation/model_description.hpp"
+#include "core/segmentation/network_input.hpp"
 #include "core/segmentation/network_segmenter.hpp"
 #include "tests/segmentation/sample_model.hpp"
 
@@ -104,6 +105,37 @@ TEST_F(LeaningLidar, HasTheClassesOfAnUprightOneWhereItsMountIsTold) {
     EXPECT_GT(found_alike(leaning, leaning), found_alike(leaning, upright));
   }
   EXPECT_LT(found_alike(about(x_axis, 180.0), upright), 0.5);
+}
+
+TEST_F(LeaningLidar, KeepsTheImageOfItsOwnAxesWhereThatIsOfFixedSize) {
+  model_.follow_sensor = false;
+  model_.fov_up = 10.0 * degree_rad;
+  model_.fov_down = -10.0 * degree_rad;
+  Scan scan;
+  // All around in its own axes, of which the turned ones leave most beyond the field of view.
+  for (int azimuth = 0; azimuth < 32; ++azimuth) {
+    const double a = (azimuth + 0.5) * std::numbers::pi / 16.0;
+    for (int ring = 0; ring < 8; ++ring) {
+      const double elevation = (8.75 - 2.5 * ring) * degree_rad;
+      scan.points_lidar.push_back(
+          (10.0 * Eigen::Vector3d(std::cos(a) * std::cos(elevation),
+                                  std::sin(a) * std::cos(elevation), std::sin(elevation)))
+              .cast<float>());
+    }
+  }
+  const Eigen::Matrix3d R_base_lidar = about(x_axis, 60.0);
+  const auto segmenter = open_model(model_);
+  segmenter->set_mount(Eigen::Isometry3d(R_base_lidar));
+  const RangeImage image(scan.points_lidar, model_.projection());
+  const std::vector<Eigen::Vector3f> turned = LidarTilt(R_base_lidar).turned(scan.points_lidar);
+  const auto opened = open_network(model_, {});
+  const PixelLabels pixels =
+      pixel_labels(opened.network->run(make_network_input(turned, {}, image, model_)), model_);
+  const PointLabels labels = segmenter->segment(scan);
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const auto pixel = static_cast<std::size_t>(image.pixel_of_point()[i]);
+    EXPECT_EQ(labels.classes[i], pixels.classes[pixel]) << i;
+  }
 }
 
 TEST_F(LeaningLidar, AtAnotherHeightHasItsPointsMovedToTheModels) {
