@@ -15,13 +15,13 @@ import torch
 import yaml
 
 from augmentation import aim, augment_points, crop, draw_motion, drop_beams, in_sector
-from export import trained_for
+from export import lidar_height, trained_for
 from losses import class_weights, lovasz_softmax, weighted_cross_entropy
-from range_images import ImageModel, normalise, project, slope_rad
+from range_images import ImageModel, RangeImage, normalise, project, slope_rad
 from networks import make_network
-from samples import TrainingSamples
-from scans import ScanFiles
-from train import Run
+from samples import TrainingSamples, _drawn_width
+from scans import ScanFiles, image_rows, sensor_image
+from train import Run, lidar_height_m
 from validation import Confusion
 
 STILLMAP = os.environ["STILLMAP"]
@@ -178,7 +178,7 @@ class Augmentation(unittest.TestCase):
         random = np.random.default_rng(2)
         points = random.normal(0, 10, (5000, 3)).astype(np.float32)
         image = project(points, np.zeros(5000, np.float32), ImageModel(8, 16, 20, -20))
-        drop_beams(image, self.settings, random)
+        drop_beams(image, 8, self.settings, random)
         self.assertEqual(sum((row >= 0).any() for row in image.point), 4)
 
     def test_crops_over_the_seam_together(self):
@@ -263,6 +263,9 @@ class Widths(unittest.TestCase):
 
 
 class Sensors(unittest.TestCase):
+    def setUp(self):
+        self.random = np.random.default_rng(1)
+
     def test_are_told_as_all_that_the_scans_were_of(self):
         scans = ScanFiles.__new__(ScanFiles)
         scans.images = [ImageModel(64, 2048, 3, -25), ImageModel(16, 2048, np.float32(15), -15)]
@@ -273,6 +276,47 @@ class Sensors(unittest.TestCase):
 
     def test_of_a_run_of_an_older_trainer_are_not_guessed(self):
         self.assertEqual(trained_for({"config": {}}), {})
+        self.assertEqual(lidar_height({"config": {}}), {})
+
+    def test_have_the_rows_that_the_engine_gives_them(self):
+        # The same table as in model_description_test.cpp.
+        even = {16: 32, 20: 40, 32: 48, 40: 56, 64: 64, 128: 96, 1024: 128, 1: 8}
+        for rings, rows in even.items():
+            sensor = {"rings": rings, "fov_up_deg": 15, "fov_down_deg": -15}
+            self.assertEqual(image_rows(sensor, 64), rows, rings)
+        uneven = {"rings": 32, "fov_up_deg": 15, "fov_down_deg": -25}
+        steps = np.arange(32) - 12.0
+        beyond = np.copysign(np.maximum(0, np.abs(steps) - 9), steps)
+        uneven["beam_elevations_deg"] = [float(e) for e in -0.333 * steps - beyond]
+        self.assertEqual(image_rows(uneven, 64), 64)
+        bands = {"pattern": "irregular", "rings": 40, "fov_up_deg": 52, "fov_down_deg": -7}
+        self.assertEqual(image_rows(bands, 64), 40)
+
+    def test_of_few_beams_have_twice_the_rows_and_fewer_columns_and_keep_their_beams(self):
+        with tempfile.TemporaryDirectory() as folder:
+            text = "{name: VLP-16, rings: 16, fov_up_deg: 16, fov_down_deg: -16}"
+            (Path(folder) / "sensor.yaml").write_text(text)
+            image = sensor_image(Path(folder), ImageModel(64, 2048, 3, -25))
+        self.assertEqual(image, ImageModel(32, 1536, 16, -16, 16))
+        self.assertEqual(_drawn_width(image, {"image_columns": [2048]}, self.random).columns, 1536)
+        scans = ScanFiles.__new__(ScanFiles)
+        scans.images = [image]
+        self.assertEqual(scans.trained_for()["max_beams"], 16)
+
+    def test_that_lose_every_other_beam_keep_both_rows_of_the_others(self):
+        image = RangeImage(np.ones((5, 32, 4)), np.zeros((32, 4), int), np.zeros(0, int))
+        drop_beams(image, 16, {"drop_beams": 0, "halve_beams": 1}, self.random)
+        kept = (image.point[:, 0] == 0).reshape(16, 2)
+        self.assertEqual(kept.sum(), 16)
+        np.testing.assert_array_equal(kept[:, 0], kept[:, 1])
+
+    def test_heights_are_those_of_the_configuration_or_of_the_model_before(self):
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "model.yaml").write_text("lidar_height_m: 1.73\n")
+            self.assertEqual(lidar_height_m({"start_from": folder}), 1.73)
+            self.assertEqual(lidar_height_m({"start_from": folder, "lidar_height_m": 0.6}), 0.6)
+        self.assertIsNone(lidar_height_m({"start_from": ""}))
+        self.assertEqual(lidar_height({"lidar_height_m": 0.6}), {"lidar_height_m": 0.6})
 
 
 class Numbers(unittest.TestCase):

@@ -65,11 +65,15 @@ def augment_points(points, remission, classes, motion, settings, random):
     return points, _change_remission(remission, settings, random), classes
 
 
-def drop_beams(image, settings, random):
-    """Clears rows of the image: random ones, and sometimes every other one."""
-    lost = random.random(len(image.point)) < random.uniform(0, settings["drop_beams"])
+def drop_beams(image, beams, settings, random):
+    """Clears the rows of beams: of random ones, and sometimes of every other one. Of more beams than
+    rows, it drops rows."""
+    rows = len(image.point)
+    beams = min(beams, rows)
+    lost = random.random(beams) < random.uniform(0, settings["drop_beams"])
     if random.random() < settings["halve_beams"]:
         lost[random.integers(2) :: 2] = True
+    lost = lost[np.arange(rows) * beams // rows]
     image.point[lost] = -1
     image.channels[:, lost] = 0
 

@@ -39,6 +39,12 @@ def trained_for(state):
     return {"trained_for": state["trained_for"]} if "trained_for" in state else {}
 
 
+def lidar_height(state):
+    """At which height they stood; nothing where nobody told."""
+    height_m = state.get("lidar_height_m")
+    return {} if height_m is None else {"lidar_height_m": float(height_m)}
+
+
 def describe_run(arguments, state):
     config = state["config"]
     image = {**config["image"]}
@@ -54,6 +60,7 @@ def describe_run(arguments, state):
         "licence": arguments.licence,
         "sensor": arguments.sensor,
         **trained_for(state),
+        **lidar_height(state),
         "training": arguments.training or f"{state['epoch']} epochs; see config.yaml of the run",
         "accuracy": arguments.accuracy or f"validation mIoU {100 * best:.1f} % of pixels",
     }

@@ -32,8 +32,8 @@ def export_onnx(network, file, shape, free_size):
 def describe(
     words, image, mean, deviation, classes, knn, follow_sensor=False, voxel_votes=None
 ):
-    """The content of model.yaml. `words`: name, licence, sensor, trained_for, training,
-    accuracy; `classes`: name of the class of each output; `knn`: None, or neighbours, window, sigma,
+    """The content of model.yaml. `words`: name, licence, sensor, trained_for, lidar_height_m,
+    training, accuracy; `classes`: name of the class of each output; `knn`: None, or neighbours, window, sigma,
     cutoff_m; `voxel_votes`: None, or edge_m, height_m, neighbour_weight, own_weight."""
     return {
         **words,

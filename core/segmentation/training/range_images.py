@@ -1,18 +1,25 @@
 """Range images of lidar scans: the projection and normalisation that the C++ engine uses."""
 
 from dataclasses import dataclass
+from typing import Optional
 
 import numpy as np
 
 
 @dataclass(frozen=True)
 class ImageModel:
-    """Size and vertical field of view of a range image."""
+    """Size and vertical field of view of a range image, and the lidar's rings where it has another
+    number of them than the image has rows."""
 
     rows: int
     columns: int
     fov_up_deg: float
     fov_down_deg: float
+    rings: Optional[int] = None
+
+    @property
+    def beams(self):
+        return self.rows if self.rings is None else self.rings
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import torch
 from augmentation import aim, augment_points, crop, draw_motion, drop_beams, in_sector
 from mixing import Objects, mix_bands, mix_sectors, turned
 from range_images import ImageModel, normalise, project
-from scans import IGNORED, ScanFiles
+from scans import IGNORED, ScanFiles, image_columns
 
 
 def open_scans(config, part):
@@ -40,7 +40,9 @@ def plain_sample(scans, index, config):
 
 def _drawn_width(image, settings, random):
     widths = settings.get("image_columns")
-    return replace(image, columns=int(random.choice(widths))) if widths else image
+    if not widths:
+        return image
+    return replace(image, columns=image_columns(image, int(random.choice(widths))))
 
 
 # Tilting changes azimuths, mostly by less than this.
@@ -67,7 +69,7 @@ class TrainingSamples(torch.utils.data.Dataset):
         self.mix_share = self.settings.get("mix_scans", 0)
         self.paste_share = self.settings.get("paste_objects", 0)
         self.objects = Objects(scans) if self.paste_share else None
-        self.rows = np.array([image.rows for image in scans.images])
+        self.beams = np.array([image.beams for image in scans.images])
 
     def __len__(self):
         return len(self.scans)
@@ -80,7 +82,7 @@ class TrainingSamples(torch.utils.data.Dataset):
         scan, azimuth_rad = self._augmented(index, model, random)
         points, remission, classes = self._mixed(scan, azimuth_rad, model, random)
         image = project(points, remission, model)
-        drop_beams(image, settings, random)
+        drop_beams(image, model.beams, settings, random)
         known = None if random.random() < settings["remission_dropout"] else remission
         channels = _network_input(image, known, self.config)
         columns = settings["crop_columns"]
@@ -97,7 +99,7 @@ class TrainingSamples(torch.utils.data.Dataset):
         """The sector, perhaps with a part of another scan's, and with objects of others."""
         width_rad = 2 * np.pi * self.settings["crop_columns"] / model.columns
         if random.random() < self.mix_share:
-            other, other_rad = self._augmented(self._another(model.rows, random), model, random)
+            other, other_rad = self._augmented(self._another(model.beams, random), model, random)
             other = (turned(other[0], azimuth_rad - other_rad), *other[1:])
             if random.random() < 0.5:
                 scan = mix_sectors(scan, other, azimuth_rad, width_rad, random)
@@ -108,9 +110,9 @@ class TrainingSamples(torch.utils.data.Dataset):
                 scan = self.objects.set_into(scan, azimuth_rad, width_rad, random)
         return scan
 
-    def _another(self, rows, random):
-        """A scan of a sensor with as many rows, of each folder as often as of the others."""
-        alike = np.flatnonzero(self.rows == rows)
+    def _another(self, beams, random):
+        """A scan of a sensor with as many beams, of each folder as often as of the others."""
+        alike = np.flatnonzero(self.beams == beams)
         folders = np.array(self.scans.folder)[alike]
         return random.choice(alike[folders == random.choice(np.unique(folders))])
 

@@ -1,5 +1,6 @@
 """SemanticKITTI folders as a training set: scans, their classes, their sensors."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -45,15 +46,44 @@ def classes_of(raw_labels):
     return _CLASSES[raw_labels & 0xFFFF]
 
 
+# A lidar of so few beams fires some 1800 times per revolution: columns beyond are empty.
+FEW_BEAMS, COLUMNS_OF_FEW_BEAMS = 16, 1536
+
+
+def _beams_by_step(sensor, usual_rows):
+    """Beams that evenly spaced ones would be if they lay as close as most of the sensor's do."""
+    rings, beams = int(sensor["rings"]), sensor.get("beam_elevations_deg") or []
+    if len(beams) < 2:
+        return rings
+    step = np.sort(-np.diff(beams))[(len(beams) - 1) // 2]
+    return max(rings, min((sensor["fov_up_deg"] - sensor["fov_down_deg"]) / step, usual_rows))
+
+
+def image_rows(sensor, usual_rows):
+    """Rows of the image of an upright lidar, as the engine chooses them (for_sensor() in
+    model_description.cpp): `sensor` as in sensor.yaml, `usual_rows` of the model."""
+    rings = rows = int(sensor["rings"])
+    if sensor.get("pattern", "rings") != "irregular":
+        rows = min(0.5 * (_beams_by_step(sensor, usual_rows) + usual_rows), 2 * rings)
+    return max(1, int(min(rows, 2 * usual_rows) / 8 + 0.5)) * 8
+
+
+def image_columns(image, columns):
+    """As many of `columns` as a lidar of its beams fills."""
+    return min(columns, COLUMNS_OF_FEW_BEAMS) if image.beams <= FEW_BEAMS else columns
+
+
 def sensor_image(sequence, default):
-    """The range image of a sequence: its sensor.yaml's rings and field of view, or `default`."""
+    """The range image of a sequence: of its sensor.yaml's rings and field of view, in as many rows
+    and columns as the engine gives it, or `default`."""
     file = sequence / "sensor.yaml"
     if not file.exists():
         return default
     sensor = yaml.safe_load(file.read_text())
-    return ImageModel(
-        int(sensor["rings"]), default.columns, sensor["fov_up_deg"], sensor["fov_down_deg"]
-    )
+    rows, rings = image_rows(sensor, default.rows), int(sensor["rings"])
+    edges = sensor["fov_up_deg"], sensor["fov_down_deg"]
+    image = ImageModel(rows, default.columns, *edges, rings)
+    return replace(image, columns=image_columns(image, default.columns))
 
 
 def share_outside(points, image):
@@ -137,8 +167,8 @@ class ScanFiles:
         """The lidars of the scans, as model.yaml tells them: fewest and most beams, and the field of
         view [degrees] that holds all of theirs."""
         return {
-            "min_beams": min(int(image.rows) for image in self.images),
-            "max_beams": max(int(image.rows) for image in self.images),
+            "min_beams": min(int(image.beams) for image in self.images),
+            "max_beams": max(int(image.beams) for image in self.images),
             "fov_up_deg": max(float(image.fov_up_deg) for image in self.images),
             "fov_down_deg": min(float(image.fov_down_deg) for image in self.images),
         }

@@ -41,7 +41,7 @@ def read_config(file, changes):
 
 
 # What export.py needs of a run.
-BEST_HOLDS = ("config", "trained_for", "averaged", "epoch", "history")
+BEST_HOLDS = ("config", "trained_for", "lidar_height_m", "averaged", "epoch", "history")
 
 
 class Rate:
@@ -62,6 +62,18 @@ class Rate:
         return 0.5 * (1 + math.cos(math.pi * min(1.0, share)))
 
 
+def lidar_height_m(config):
+    """Height above the ground of most lidars of the scans: as configured, else that of the run or
+    the model that this run starts from; None where nobody tells."""
+    if config.get("lidar_height_m") is not None or not config["start_from"]:
+        return config.get("lidar_height_m")
+    file = Path(config["start_from"])
+    if file.suffix == ".pt":
+        return torch.load(file, map_location="cpu").get("lidar_height_m") if file.exists() else None
+    file = (file.parent if file.suffix == ".onnx" else file) / "model.yaml"
+    return yaml.safe_load(file.read_text()).get("lidar_height_m") if file.exists() else None
+
+
 def precision(config, device):
     """A context in which convolutions run in bfloat16, where the configuration says so."""
     reduced = config["optimiser"].get("bfloat16", False)
@@ -73,6 +85,7 @@ class Run:
 
     def __init__(self, config, folder, device):
         self.config, self.folder, self.device = config, folder, device
+        self.lidar_height_m = lidar_height_m(config)
         self.scans = open_scans(config, "train")
         self.validation = open_scans(config, "validation")
         try:
@@ -130,12 +143,16 @@ class Run:
         fresh = {"base_lrs": self.schedule.base_lrs, "lr_lambdas": [None]}
         self.schedule.load_state_dict({**state["schedule"], **fresh})
         self.epoch, self.step, self.history = state["epoch"], state["step"], state["history"]
+        # What it started from may be gone.
+        if self.lidar_height_m is None:
+            self.lidar_height_m = state.get("lidar_height_m")
         print(f"{file}: goes on after epoch {self.epoch}")
 
     def save(self):
         state = {
             "config": self.config,
             "trained_for": self.scans.trained_for(),
+            "lidar_height_m": self.lidar_height_m,
             "network": self.network.state_dict(),
             "averaged": self.averaged.state_dict(),
             "optimiser": self.optimiser.state_dict(),
