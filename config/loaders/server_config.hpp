@@ -22,7 +22,7 @@ namespace stillmap {
 
 /// Where the class of a point comes from.
 enum class LabelProvider {
-  /// The label field of the incoming cloud where it is there, else the network.
+  /// The label field of the incoming cloud where it holds a known class, else the network.
   automatic,
   /// The label field of the incoming cloud where it is there, else none.
   stream,

@@ -125,9 +125,10 @@ void require_valid(const ModelDescription& model);
                                const SensorModel& sensor);
 
 /// The model with the image for this sensor. With follow_sensor: the sensor's field of view in rows
-/// half way between its rings and `rows` of the model (at most twice the rings, and twice those
-/// rows; a multiple of 8), and for sensors of few rings a limit on the columns. Of a sensor that
-/// leans so much that its image is turned, up to half as many rows more. Else unchanged.
+/// half way between its rings and `rows` of the model (about twice the rings at most, but 8 rows at
+/// least, and twice those of the model at most; the nearest multiple of 8), and for sensors of few
+/// rings a limit on the columns. Of a sensor that leans so much that its image is turned, up to
+/// half as many rows more. Else unchanged.
 [[nodiscard]] ModelDescription for_sensor(ModelDescription model, const SensorModel& sensor,
                                           const LidarTilt& tilt = {});
 
