@@ -64,6 +64,22 @@ TEST_F(ModelCommandTest, CalibrationMakesInt8TheDefault) {
               HasSubstr("oneDNN fp32"));
 }
 
+TEST_F(ModelCommandTest, CalibrationThatNoStartWouldTakeIsNotWritten) {
+  OnnxBuilder network(5, 0, 0);
+  const std::vector<float> zeros(8 * 5, 0.0F);
+  network.weights(float_tensor("dead", {8, 5, 1, 1}, zeros), "dead");
+  std::string x = network.node("Conv", {"input", "dead"}, 8);
+  x = network.convolve(network.convolve(x, 8, {}, true), 20, {}, true);
+  std::ofstream(folder_ / "model/model.onnx", std::ios::binary)
+      << network.bytes(network.softmax(x));
+  simulate("city", 3);
+  const ProcessResult refused = model("calibrate " + path("model") + " " + path("city"));
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("int8.yaml"), HasSubstr("8 zeros"), HasSubstr("--scans"),
+                                 HasSubstr("precision: fp32")));
+  EXPECT_FALSE(exists("model/int8.yaml"));
+}
+
 TEST_F(ModelCommandTest, RunGivesProbabilitiesOfEveryImage) {
   write("images.f32", std::string(2 * 5 * pixels * sizeof(float), '\0'));
   const ProcessResult result = model("run " + path("model") + " --engine opencv --input " +

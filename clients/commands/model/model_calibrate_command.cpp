@@ -9,6 +9,7 @@
 #include "config/loaders/int8_file.hpp"
 #include "core/segmentation/int8_calibration.hpp"
 #include "core/segmentation/model_error.hpp"
+#include "core/segmentation/onednn/prepare_network.hpp"
 #include "core/segmentation/onednn_network.hpp"
 
 namespace stillmap::cli {
@@ -51,6 +52,17 @@ ActivationRanges observe_activations(const ModelArguments& arguments, const Mode
   return ranges;
 }
 
+/// Else every start would refuse the file.
+void require_usable(const Int8Calibration& calibration, const ModelDescription& model) {
+  const NetworkGraph graph = prepare_network(OnnxFile(model.network_file), model).graph;
+  const std::string fault = calibration_fault(graph, calibration);
+  if (fault.empty()) return;
+  throw ModelError(model.network_file.parent_path() / "int8.yaml",
+                   "is not written: " + fault +
+                       "; calibrate with more --scans or other data sets, or use the model with "
+                       "precision: fp32");
+}
+
 ExitCode run(const ModelCalibrateArguments& arguments) {
   const ModelDescription model = load_uncalibrated_model(arguments.model);
   if (std::filesystem::path(arguments.model.model).extension() == ".onnx") {
@@ -67,6 +79,7 @@ ExitCode run(const ModelCalibrateArguments& arguments) {
                      std::to_string(datasets.size()) + " data sets";
   calibration.range_of_channels = ranges.ranges(arguments.share);
   calibration.float_layers = arguments.float_layers;
+  require_usable(calibration, fitted(arguments.model, model, datasets.front().suggested_sensor()));
   const std::filesystem::path file = model.network_file.parent_path() / "int8.yaml";
   save_int8_calibration(calibration, file);
   std::cout << file.string() << ": " << calibration.range_of_channels.size() << " tensors, "
