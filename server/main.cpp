@@ -50,11 +50,10 @@ std::string topics_of_scans(const stillmap::ServerConfig& config) {
 }
 
 std::unique_ptr<stillmap::Segmenter> open_labels(const stillmap::ServerConfig& config,
-                                                 const stillmap::SensorModel& sensor) {
+                                                 const stillmap::SensorModel& sensor,
+                                                 const Eigen::Isometry3d& T_base_lidar) {
   const bool adaptive_width = stillmap::server::segmentation_budget(config).count() > 0;
-  // A mount that /tf_static tells is not known yet.
-  auto labels =
-      stillmap::open_segmenter(config.labels, sensor, adaptive_width, config.mount.T_base_lidar);
+  auto labels = stillmap::open_segmenter(config.labels, sensor, adaptive_width, T_base_lidar);
   if (const std::string details = labels->details(); !details.empty()) {
     spdlog::info("labels by {}: {}", labels->name(), details);
   }
@@ -71,7 +70,9 @@ int serve(const stillmap::ServerConfig& config) {
   static_cast<void>(std::signal(SIGPIPE, SIG_IGN));
   stillmap::server::start_tbb_workers();
   stillmap::server::Server server(
-      config, [&](const stillmap::SensorModel& sensor) { return open_labels(config, sensor); });
+      config, [&](const stillmap::SensorModel& sensor, const Eigen::Isometry3d& T_base_lidar) {
+        return open_labels(config, sensor, T_base_lidar);
+      });
   if (!config.automatic_sensor.is_on) {
     const auto hint = stillmap::better_model(config.labels, config.mapper.sensor);
     if (!hint.empty()) spdlog::info("{}; labels.model chooses", hint);

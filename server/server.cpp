@@ -95,8 +95,10 @@ Server::Parts::Parts(const ServerConfig& config, std::unique_ptr<Segmenter> segm
 }
 
 Server::Server(const ServerConfig& config, const OpenSegmenter& open_segmenter)
-    : parts_(
-          std::make_unique<Parts>(config, open_segmenter(config.mapper.sensor), open_segmenter)) {}
+    // A mount that /tf_static tells is not known yet.
+    : parts_(std::make_unique<Parts>(
+          config, open_segmenter(config.mapper.sensor, config.mount.T_base_lidar),
+          open_segmenter)) {}
 
 Server::~Server() = default;
 

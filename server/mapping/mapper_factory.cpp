@@ -58,7 +58,8 @@ void MapperFactory::tell_of_better_model(const SensorModel& sensor) const {
   }
 }
 
-Mapper MapperFactory::make_for(const SensorModel& sensor, MapperListeners listeners) const {
+Mapper MapperFactory::make_for(const SensorModel& sensor, const Eigen::Isometry3d& T_base_lidar,
+                               MapperListeners listeners) const {
   MapperConfig mapper = mapper_;
   if (const auto fault = range_fault(sensor, automatic_, mapper.prepare))
     spdlog::warn("prepare.{} {}; until then both ranges are the lidar's", fault->field,
@@ -66,7 +67,7 @@ Mapper MapperFactory::make_for(const SensorModel& sensor, MapperListeners listen
   use_sensor(sensor, automatic_, mapper);
   std::unique_ptr<Segmenter> segmenter;
   try {
-    segmenter = open_segmenter_(sensor);
+    segmenter = open_segmenter_(sensor, T_base_lidar);
   } catch (const std::exception& fault) {
     const std::string why = "for the lidar '" + sensor.name + "': " + fault.what();
     const bool may_come_with_scans = labels_.source == LabelProvider::automatic;

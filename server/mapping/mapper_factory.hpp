@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <chrono>
 #include <functional>
 #include <memory>
@@ -12,8 +13,10 @@
 
 namespace stillmap::server {
 
-/// Opens the source of labels for scans of this lidar. Throws ModelError or ConfigError.
-using OpenSegmenter = std::function<std::unique_ptr<Segmenter>(const SensorModel& sensor)>;
+/// Opens the source of labels for scans of this lidar, which sits there on the robot. Throws
+/// ModelError or ConfigError.
+using OpenSegmenter = std::function<std::unique_ptr<Segmenter>(
+    const SensorModel& sensor, const Eigen::Isometry3d& T_base_lidar)>;
 
 /// Makes mappers for the lidar that the configuration names, or for one that its scans have told.
 class MapperFactory {
@@ -31,7 +34,8 @@ class MapperFactory {
   void tell_of_better_model(const SensorModel& sensor) const;
   /// For this lidar, with labels that are opened for it; where that fails, with none but those that
   /// come with scans where they may (labels.source: auto), and the status tells why.
-  [[nodiscard]] Mapper make_for(const SensorModel& sensor, MapperListeners listeners) const;
+  [[nodiscard]] Mapper make_for(const SensorModel& sensor, const Eigen::Isometry3d& T_base_lidar,
+                                MapperListeners listeners) const;
 
  private:
   [[nodiscard]] Mapper make_with(const MapperConfig& mapper, std::unique_ptr<Segmenter> segmenter,

@@ -11,6 +11,7 @@
 #include "core/frames/rigid_motion.hpp"
 #include "core/map/map_id.hpp"
 #include "core/map/tile_evidence.hpp"
+#include "core/segmentation/lidar_tilt.hpp"
 #include "server/mapping/milliseconds.hpp"
 
 namespace stillmap::server {
@@ -93,9 +94,18 @@ MapperListeners MappingThread::listeners() {
               }};
 }
 
+bool MappingThread::tells_lidar(const std::shared_ptr<const SensorModel>& sensor) const {
+  return sensor && sensor != sensor_ && factory_.knows_other_lidars();
+}
+
+bool MappingThread::leans_by_published_mount() const {
+  return !frames_.is_configured() && !LidarTilt(frames_.T_base_lidar().linear()).is_upright();
+}
+
 bool MappingThread::use_sensor(const std::shared_ptr<const SensorModel>& sensor) {
-  if (!sensor || sensor == sensor_ || !factory_.knows_other_lidars()) return false;
-  const bool is_configured = !sensor_ && sensor->name == mapper_config_.sensor.name;
+  if (!tells_lidar(sensor)) return false;
+  const bool is_configured =
+      !sensor_ && sensor->name == mapper_config_.sensor.name && !leans_by_published_mount();
   sensor_ = sensor;
   statistics_.set_sensor(sensor->name);
   factory_.tell_of_better_model(*sensor);
@@ -105,7 +115,7 @@ bool MappingThread::use_sensor(const std::shared_ptr<const SensorModel>& sensor)
   ResumedMap map = mapper_.resume(ResumedMap::of(StaticMap(mapper_config_.static_map)));
   // What this lidar saw when it was taken for another one is all that it can be registered to.
   if (has_mapped) map = ResumedMap::of(std::move(map.map));
-  mapper_ = factory_.make_for(*sensor, listeners());
+  mapper_ = factory_.make_for(*sensor, frames_.T_base_lidar(), listeners());
   mapper_.keep_confirmed_scans(true);
   static_cast<void>(mapper_.resume(std::move(map)));
   sensor_period_s_ = sensor->period_s;
@@ -324,9 +334,10 @@ void MappingThread::map(QueuedScan queued) {
   received_ = queued.received;
   statistics_.add_latency("queue", milliseconds(began - queued.received));
   const std::int64_t stamp_ns = queued.scan.stamp_ns;
+  // Before the labels are opened, whose images are of the lidar as it stands there.
+  if (!locate_lidar(queued)) return drop({"unknown_frame", frames_.missing()});
   if (use_sensor(queued.sensor) && is_live_ && queue_.waiting() > 0)
     return drop({"sensor_told", "the network was made ready for the lidar that this scan told"});
-  if (!locate_lidar(queued)) return drop({"unknown_frame", frames_.missing()});
   mapper_.set_mount(frames_.T_base_lidar());
   // A clock that is being set back: a correction, which tells times apart, is to meet none of after
   // that. Now no scan waits for it: none is mapped until the mapper believes the clock.
@@ -368,7 +379,8 @@ void MappingThread::drop(const ScanRejection& rejection) {
 }
 
 bool MappingThread::locate_lidar(const QueuedScan& queued) {
-  if (!frames_.locate_lidar(queued.frame, mapper_.trajectory().empty())) return false;
+  const bool begins = mapper_.trajectory().empty() || tells_lidar(queued.sensor);
+  if (!frames_.locate_lidar(queued.frame, begins)) return false;
   const bool is_told = mounted_frame_ == frames_.lidar() || !frames_.is_configured();
   if (is_told || !frames_.has_base() || outputs_.poses == nullptr) return true;
   mounted_frame_ = frames_.lidar();

@@ -128,6 +128,10 @@ class MappingThread : public CheckpointSource {
 
   void map(QueuedScan queued);
   [[nodiscard]] MapperListeners listeners();
+  /// Whether this lidar is not the one that the mapper is told already.
+  [[nodiscard]] bool tells_lidar(const std::shared_ptr<const SensorModel>& sensor) const;
+  /// Whether it leans as /tf_static tells, which nobody knew when the first labels were opened.
+  [[nodiscard]] bool leans_by_published_mount() const;
   /// Goes on for this lidar, with the map and where the last pose was. False where it does already,
   /// or nothing is known of it.
   bool use_sensor(const std::shared_ptr<const SensorModel>& sensor);

@@ -6,9 +6,12 @@
 #include <stdexcept>
 
 #include "core/segmentation/model_error.hpp"
+#include "idl/conversions/pose.hpp"
+#include "idl/dds/writer.hpp"
 #include "server/mapping/mapping_thread.hpp"
 #include "server/publishers/status_publisher.hpp"
 #include "tests/eventually.hpp"
+#include "tests/idl/dds_fixture.hpp"
 #include "tests/server/room_scans.hpp"
 
 namespace stillmap::server {
@@ -39,8 +42,11 @@ class ToldSensor : public testing::Test {
 
   void start() {
     MappingOutputs helpers;
-    helpers.open_segmenter = [this](const SensorModel& sensor) {
+    helpers.static_transforms = robot_ ? &robot_->transforms : nullptr;
+    helpers.open_segmenter = [this](const SensorModel& sensor,
+                                    const Eigen::Isometry3d& T_base_lidar) {
       opened_.push_back(sensor.name);
+      T_base_lidar_opened_ = T_base_lidar;
       if (fails_) throw ModelError("street", "has no images of so many rows");
       return std::make_unique<MountKeeper>(T_base_lidar_told_);
     };
@@ -70,15 +76,30 @@ class ToldSensor : public testing::Test {
     return (latest_map_.newest_pose().T_map_lidar.translation() - T_true.translation()).norm();
   }
 
+  /// Tells on /tf_static where the lidar sits.
+  struct Robot {
+    explicit Robot(Statistics& statistics) : transforms(participant, topics, statistics) {}
+
+    dds::Participant participant{dds::loopback(true)};
+    // A participant does not hear itself.
+    dds::Participant other{dds::loopback(true)};
+    dds::Topics topics = dds::Topics::in("stillmap");
+    dds::Writer<tf2_msgs::msg::TFMessage> writer{other, topics.tf_static.dds_name,
+                                                 topics.tf_static.writer};
+    StaticTransforms transforms;
+  };
+
   ServerConfig config_;
   std::vector<std::string> opened_;
   bool fails_ = false;
   bool are_labelled_ = true;
+  Eigen::Isometry3d T_base_lidar_opened_ = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d T_base_lidar_told_ = Eigen::Isometry3d::Identity();
   std::shared_ptr<const SensorModel> told_ = std::make_shared<const SensorModel>(vlp_16());
   ScanQueue queue_{30};
   Statistics statistics_;
   LatestMap latest_map_;
+  std::optional<Robot> robot_;
   ServerReport report_{{.label_source = "stream", .points_topic = {}, .host_diagnostics = {}},
                        latest_map_,
                        statistics_,
@@ -113,7 +134,24 @@ TEST_F(ToldSensor, HasItsMountToldToWhatLabelsItsScans) {
       Eigen::Translation3d(0.5, 0.0, 1.2) * Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY());
   start();
   drive(2, told_);
+  EXPECT_TRUE(T_base_lidar_opened_.isApprox(config_.mount.T_base_lidar));
   EXPECT_TRUE(T_base_lidar_told_.isApprox(config_.mount.T_base_lidar));
+}
+
+TEST_F(ToldSensor, HasLabelsOpenedForItWhereItsRobotTellsThatItSits) {
+  config_.frames.base = "base_link";
+  config_.mount.source = MountConfig::Source::tf_static;
+  config_.mount.wait_s = 60.0;
+  // The network that is there was opened for one that stands upright.
+  config_.mapper.sensor = vlp_16();
+  robot_.emplace(statistics_);
+  const Eigen::Isometry3d T_base_lidar =
+      Eigen::Translation3d(0.5, 0.0, 1.2) * Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY());
+  ASSERT_TRUE(robot_->writer.write(wire::to_tf(0, {{"base_link", "lidar", T_base_lidar}})));
+  start();
+  drive(2, told_);
+  EXPECT_THAT(opened_, ElementsAre("VLP-16"));
+  EXPECT_TRUE(T_base_lidar_opened_.isApprox(T_base_lidar, 1e-6));
 }
 
 TEST_F(ToldSensor, LateGoesOnInTheMapWhereItIs) {
