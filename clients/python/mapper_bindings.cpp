@@ -32,6 +32,22 @@ LabelsConfig labels_from(LabelsConfig labels, const std::string& source) {
   return labels;
 }
 
+/// The lidar's place on the robot, as `stillmap map` takes it from the file.
+Eigen::Isometry3d mount_of(const ServerConfig& config, const std::filesystem::path& file) {
+  if (!config.lidars.empty()) {
+    throw std::invalid_argument(file.string() +
+                                " lists several lidars ('sensors'), but a mapper is of one: give a "
+                                "file with 'sensor' and 'mount'");
+  }
+  if (config.frames.base.empty()) return Eigen::Isometry3d::Identity();
+  if (config.mount.source == MountConfig::Source::tf_static) {
+    throw std::invalid_argument(file.string() +
+                                " takes the lidar's place from /tf_static, which a mapper does not "
+                                "hear: give it as mount.xyz_m and mount.rpy_deg");
+  }
+  return config.mount.T_base_lidar;
+}
+
 /// A mapper that threads use one after the other.
 class SharedMapper {
  public:
@@ -54,13 +70,17 @@ std::unique_ptr<SharedMapper> make_mapper(const SensorModel& sensor, const std::
                                           const std::optional<std::filesystem::path>& config_file) {
   const py::gil_scoped_release released;
   ServerConfig config;
-  if (config_file) config = load_server_config(*config_file);
+  Eigen::Isometry3d T_base_lidar = Eigen::Isometry3d::Identity();
+  if (config_file) {
+    config = load_server_config(*config_file);
+    T_base_lidar = mount_of(config, *config_file);
+  }
   if (const auto fault = range_fault(sensor, config.automatic_sensor, config.mapper.prepare))
     throw std::invalid_argument("prepare." + fault->field + ": " + fault->text);
   use_sensor(sensor, config.automatic_sensor, config.mapper);
   auto mapper = std::make_unique<Mapper>(
       config.mapper,
-      open_segmenter(labels_from(config.labels, labels), sensor, false, config.mount.T_base_lidar));
+      open_segmenter(labels_from(config.labels, labels), sensor, false, T_base_lidar));
   mapper->reset(new_map_id());
   return std::make_unique<SharedMapper>(std::move(mapper));
 }

@@ -87,6 +87,19 @@ def test_wrong_settings_are_refused(city):
         mapper.process(stillmap.Scan(np.zeros((0, 3))), np.diag([2.0, 2, 2, 1]))
 
 
+def test_a_file_whose_mount_no_mapper_can_know_is_refused(tmp_path):
+    sensor = stillmap.load_sensor("vlp_16")
+    file = tmp_path / "server.yaml"
+    file.write_text("frames: {base: base_link}\nmount: {source: tf_static}\n")
+    with pytest.raises(ValueError, match="server.yaml takes .* from /tf_static.*xyz_m"):
+        stillmap.Mapper(sensor, config=file, labels="none")
+    lidar = "{{name: {0}, topic: {0}/points, sensor: vlp_16, xyz_m: [{1}, 0, 1], rpy_deg: [0, 0, 0]}}"
+    both = ", ".join([lidar.format("front", 1), lidar.format("rear", -1)])
+    file.write_text(f"frames: {{base: base_link}}\nsensors: [{both}]\n")
+    with pytest.raises(ValueError, match="server.yaml lists several lidars"):
+        stillmap.Mapper(sensor, config=file, labels="none")
+
+
 def test_other_threads_run_meanwhile(city):
     dataset = stillmap.open_dataset(city)
     mapper = stillmap.Mapper(dataset.sensor)
