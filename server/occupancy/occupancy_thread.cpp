@@ -40,7 +40,11 @@ void OccupancyThread::insert_urgent(Jobs& jobs, Job job) {
 void OccupancyThread::begin(std::shared_ptr<const MapSnapshot> view) {
   jobs_.edit([&](Jobs& jobs) {
     std::erase_if(jobs, [](const Job& job) { return !std::holds_alternative<Encoding>(job); });
-    next_map_ = view->tiles.empty() ? NextMap::empty : NextMap::of_voxels;
+    {
+      const std::scoped_lock lock(next_map_mutex_);
+      next_map_ = view->tiles.empty() ? NextMap::empty : NextMap::of_voxels;
+      refused_from_ = std::chrono::steady_clock::now() + longest_wait;
+    }
     insert_urgent(jobs, NewMap{std::move(view)});
     ++maps_begun_;
   });
@@ -86,7 +90,9 @@ void OccupancyThread::run(NewMap job) {
     stamp_ns_ = 0;
     jobs_.edit([&](const Jobs& jobs) {
       const bool another_waits = !jobs.empty() && std::holds_alternative<NewMap>(jobs.front());
-      if (!another_waits) next_map_ = NextMap::none;
+      if (another_waits) return;
+      const std::scoped_lock lock_next(next_map_mutex_);
+      next_map_ = NextMap::none;
     });
     ++changes_;
   }
@@ -127,12 +133,17 @@ void OccupancyThread::throttle() const {
 }
 
 std::unique_lock<std::mutex> OccupancyThread::lock_made() const {
-  std::unique_lock lock(map_mutex_);
-  if (made_.wait_for(lock, longest_wait, [this] { return next_map_ != NextMap::of_voxels; })) {
-    return lock;
+  std::unique_lock next_map(next_map_mutex_);
+  // A copy: another map may begin meanwhile.
+  const auto refused_from = refused_from_;
+  if (!made_.wait_until(next_map, refused_from,
+                        [this] { return next_map_ != NextMap::of_voxels; })) {
+    throw OctreeNotMade(
+        "the octree of the map that has just begun is still being made, at idle priority: ask "
+        "again");
   }
-  throw OctreeNotMade(
-      "the octree of the map that has just begun is still being made, at idle priority: ask again");
+  next_map.unlock();
+  return std::unique_lock(map_mutex_);
 }
 
 OccupancyAnswers OccupancyThread::answer(const OccupancyQuery& query) const {

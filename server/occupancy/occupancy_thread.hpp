@@ -49,8 +49,9 @@ class OccupancyThread {
                   ThrottleCallback throttle = {},
                   BackgroundScheduling scheduling = BackgroundScheduling::idle);
 
-  /// How long queries wait for the octree of a map that has just begun: less than clients wait for
-  /// an answer before they ask again.
+  /// How long after the beginning of a map queries still wait for its octree: less than clients
+  /// wait for an answer before they ask again. They are answered one after the other: were it as
+  /// long for each, those behind the first would hear nothing in time.
   static constexpr std::chrono::milliseconds longest_wait{2000};
 
   /// Starts a new map from the voxels of this view; until they are inserted, queries wait. Returns
@@ -60,10 +61,10 @@ class OccupancyThread {
   /// Drops and restores parts of the octree with the tiles that were evicted and reloaded.
   void follow(std::shared_ptr<const MapSnapshot> view);
 
-  /// Throws std::invalid_argument for a query that asks for too much, OctreeNotMade after
-  /// `longest_wait`.
+  /// Throws std::invalid_argument for a query that asks for too much, OctreeNotMade where
+  /// the octree is not there `longest_wait` after `begin`.
   [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query) const;
-  /// Encodes on the calling thread. Throws OctreeNotMade after `longest_wait`.
+  /// Encodes on the calling thread. Throws OctreeNotMade as `answer` does.
   [[nodiscard]] EncodedOctree encode(bool binary) const;
   /// Encodes on this object's thread, before the scans that wait; one request at a time. The future
   /// throws std::future_error when the thread ends before.
@@ -111,9 +112,13 @@ class OccupancyThread {
   OccupancyMap map_;
   /// What waits to replace it: a map without voxels needs no octree to answer from.
   enum class NextMap : std::uint8_t { none, empty, of_voxels };
-  /// Changed under the queue's lock.
+  /// Changed under the queue's lock and the next one.
   std::atomic<NextMap> next_map_ = NextMap::none;
+  /// The last one taken: a map begins without waiting for queries, which hold the map's.
+  mutable std::mutex next_map_mutex_;
   mutable std::condition_variable made_;
+  /// When queries wait no longer for the map that has begun.
+  std::chrono::steady_clock::time_point refused_from_;
   std::atomic<std::uint64_t> maps_begun_ = 0;
   std::uint64_t changes_ = 0;
   std::int64_t stamp_ns_ = 0;

@@ -134,24 +134,56 @@ TEST_F(GatedOccupancyThreadTest, EncodesInAGap) {
   EXPECT_EQ(encoded.wait_for(patience), std::future_status::ready);
 }
 
-TEST_F(GatedOccupancyThreadTest, WaitsForTheOctreeOfAMapThatBeginsWithVoxels) {
+/// A map of one scan.
+std::shared_ptr<const MapSnapshot> map_of_a_room() {
   StaticMap map{StaticMapConfig{}};
   const server::OccupancyScan scan = room(0);
   map.insert(*scan.labelled, scan.T_map_lidar);
-  ASSERT_FALSE(map.view()->tiles.empty());
+  return map.view();
+}
+
+TEST_F(GatedOccupancyThreadTest, WaitsForTheOctreeOfAMapThatBeginsWithVoxels) {
   server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate(), scheduling);
   set_open(false);
-  thread.begin(map.view());
+  thread.begin(map_of_a_room());
   ASSERT_TRUE(waits());
-  // Nothing known is no answer.
-  EXPECT_THROW(static_cast<void>(all_of(thread)), server::OctreeNotMade);
-  EXPECT_THROW(static_cast<void>(thread.encode(true)), server::OctreeNotMade);
   std::future<BoxOccupancy> asked =
       std::async(std::launch::async, [&thread] { return all_of(thread); });
-  EXPECT_EQ(asked.wait_for(100ms), std::future_status::timeout);
+  EXPECT_EQ(asked.wait_for(100ms), std::future_status::timeout) << "nothing known is no answer";
   set_open(true);
   EXPECT_GT(asked.get().occupied, 100U);
   EXPECT_FALSE(thread.encode(true).data.bytes.empty());
+}
+
+// By a thread that answers requests one after the other.
+TEST_F(GatedOccupancyThreadTest, RefusesAllWhoAskForAnOctreeThatIsNotMadeWithinOneWait) {
+  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate(), scheduling);
+  set_open(false);
+  const auto began = std::chrono::steady_clock::now();
+  thread.begin(map_of_a_room());
+  ASSERT_TRUE(waits());
+  EXPECT_THROW(static_cast<void>(all_of(thread)), server::OctreeNotMade);
+  EXPECT_GE(std::chrono::steady_clock::now() - began, server::OccupancyThread::longest_wait);
+  EXPECT_THROW(static_cast<void>(thread.encode(true)), server::OctreeNotMade);
+  EXPECT_THROW(static_cast<void>(all_of(thread)), server::OctreeNotMade);
+  EXPECT_LT(std::chrono::steady_clock::now() - began, 2 * server::OccupancyThread::longest_wait);
+  set_open(true);
+  EXPECT_TRUE(eventually([&] { return thread.changes() > 0; }));
+  EXPECT_GT(all_of(thread).occupied, 100U);
+}
+
+TEST_F(GatedOccupancyThreadTest, AnEmptyMapThatBeginsIsAnsweredFromAtOnce) {
+  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate(), scheduling);
+  set_open(false);
+  thread.begin(map_of_a_room());
+  ASSERT_TRUE(waits());
+  std::future<BoxOccupancy> asked =
+      std::async(std::launch::async, [&thread] { return all_of(thread); });
+  EXPECT_EQ(asked.wait_for(100ms), std::future_status::timeout);
+  thread.begin(StaticMap{StaticMapConfig{}}.view());
+  EXPECT_EQ(asked.wait_for(1s), std::future_status::ready);
+  EXPECT_EQ(asked.get().occupied, 0U);
+  set_open(true);
 }
 
 TEST_F(GatedOccupancyThreadTest, ShowsNothingOfTheOldMapWhileANewOneWaitsForAGap) {
