@@ -13,6 +13,9 @@ namespace {
 // The other half is for late joiners, repairs and answers.
 constexpr std::uint32_t new_tile_share = 2;
 
+/// About what an entry of the index has on the wire.
+constexpr std::size_t entry_bytes = 150;
+
 /// About what the tile's message has on the wire.
 std::size_t message_bytes(const TileInfo& tile) {
   constexpr std::size_t bytes_per_voxel = 27;
@@ -152,9 +155,11 @@ void TilePublisher::announce(const TileInfo& info, const dds::MapIdentity& ident
   Published& known = published_[info.id];
   if (known.entry == info.revision) return;
   known.entry = info.revision;
+  // Else one that goes on changing would stay before all others whose entry waits for tokens.
+  known.publication = ++publications_;
   static_cast<void>(index_.write(wire::to_wire(info, identity)));
-  // Those who follow the index now ask for the voxels.
-  token_bucket_.consume(message_bytes(info));
+  // The voxels are charged when they are sent.
+  token_bucket_.consume(entry_bytes);
 }
 
 void TilePublisher::announce_gone(TileId id, const MapSnapshot& view,

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <map>
+#include <set>
 #include <thread>
 
 #include "idl/conversions/tile.hpp"
@@ -20,30 +21,33 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t tile_voxels = 1000;
 
-std::shared_ptr<const Tile> tile_of(TileId id, std::uint64_t revision) {
+std::shared_ptr<const Tile> tile_of(TileId id, std::uint64_t revision,
+                                    std::size_t voxels = tile_voxels) {
   Tile tile;
   tile.info = {.id = id, .revision = revision, .content_hash = revision, .bounds_map = {}};
-  tile.voxels = PackedVoxels(id, {0.2, 20.0}, std::vector<Voxel>(tile_voxels));
-  tile.info.voxel_count = tile_voxels;
+  tile.voxels = PackedVoxels(id, {0.2, 20.0}, std::vector<Voxel>(voxels));
+  tile.info.voxel_count = static_cast<std::uint32_t>(voxels);
   return std::make_shared<const Tile>(std::move(tile));
 }
 
-std::shared_ptr<const MapSnapshot> row_of_tiles(int count, std::uint64_t revision) {
+std::shared_ptr<const MapSnapshot> row_of_tiles(int count, std::uint64_t revision,
+                                                std::size_t voxels = tile_voxels) {
   auto view = std::make_shared<MapSnapshot>();
   view->version = revision;
   view->map_id = 7;
   view->tile_size_m = 20.0;
   view->voxel_size_m = 0.2;
-  for (int x = 0; x < count; ++x) view->tiles.set(tile_of({x, 0}, revision));
+  for (int x = 0; x < count; ++x) view->tiles.set(tile_of({x, 0}, revision, voxels));
   return view;
 }
 
 /// The row, with tile 0 at another revision.
 std::shared_ptr<const MapSnapshot> with_first_changed(const MapSnapshot& row,
-                                                      std::uint64_t revision) {
+                                                      std::uint64_t revision,
+                                                      std::size_t voxels = tile_voxels) {
   auto view = std::make_shared<MapSnapshot>(row);
   view->version = revision;
-  view->tiles.set(tile_of({0, 0}, revision));
+  view->tiles.set(tile_of({0, 0}, revision, voxels));
   return view;
 }
 
@@ -181,8 +185,12 @@ TEST_F(TilePacing, WhatChangesWhileItWaitsIsSentAsItIsThen) {
 /// Beside a reader of tiles that has room for one, and takes none.
 class StalledTileReader : public testing::Test {
  protected:
-  static dds::DdsOptions options() {
+  /// 0: the network carries everything.
+  explicit StalledTileReader(std::uint32_t bytes_per_s = 0)
+      : here_(options(bytes_per_s)), there_(options(bytes_per_s)) {}
+  static dds::DdsOptions options(std::uint32_t bytes_per_s) {
     dds::DdsOptions options = dds::loopback(false);
+    options.large_message_bytes_per_s = bytes_per_s;
     // So long the publisher waits for that reader.
     options.lease_s = static_cast<std::uint32_t>(dds::discovery_timeout.count());
     return options;
@@ -202,8 +210,8 @@ class StalledTileReader : public testing::Test {
   }
 
   dds::Topics topics_ = dds::Topics::in("stillmap");
-  dds::Participant here_{options()};
-  dds::Participant there_{options()};
+  dds::Participant here_;
+  dds::Participant there_;
   TileReader tiles_;
   TilePublisher publisher_{here_, topics_, tiles_, 2000.0};
   dds::Reader<MapTile> stalled_{there_, topics_.tiles.dds_name, room_for_one(topics_.tiles.reader)};
@@ -231,6 +239,56 @@ TEST_F(StalledTileReader, HoldsUpNeitherEntriesNorRemovals) {
   publisher_.publish(next, Eigen::Vector2d::Zero());
   stillmap_msgs::msg::TileInfo message;
   EXPECT_FALSE(index_.take(message, {}, 300ms));
+}
+
+/// The same, over a network that carries little.
+class StalledTileReaderOfALimitedRate : public StalledTileReader {
+ protected:
+  explicit StalledTileReaderOfALimitedRate(std::uint32_t bytes_per_s = 400'000)
+      : StalledTileReader(bytes_per_s) {}
+  void SetUp() override {
+    ASSERT_TRUE(stalled_.events().wait_for_writer(dds::discovery_timeout));
+    ASSERT_TRUE(index_.events().wait_for_writer(dds::discovery_timeout));
+  }
+  /// The tiles that the index says are of this revision or a later one, until they are so many.
+  std::set<std::int32_t> take_since(std::uint64_t revision, std::size_t tiles,
+                                    std::chrono::milliseconds patience) {
+    stillmap_msgs::msg::TileInfo message;
+    while (said_.size() < tiles && index_.take(message, {}, patience)) {
+      if (message.state().revision() >= revision) said_.insert(message.tile_x());
+    }
+    return said_;
+  }
+  std::set<std::int32_t> said_;
+};
+
+TEST_F(StalledTileReaderOfALimitedRate, EntriesTakeNoMoreOfItThanTheyAre) {
+  publisher_.publish(row_of_tiles(6, 1), Eigen::Vector2d::Zero());
+  ASSERT_EQ(publisher_.waiting(), 0U);
+  // Voxels of one of them would use up what is left of the second.
+  publisher_.publish(row_of_tiles(40, 2), Eigen::Vector2d::Zero());
+  EXPECT_EQ(publisher_.waiting(), 40U);
+  EXPECT_EQ(take_since(2, 40, 2s).size(), 40U);
+}
+
+class StalledTileReaderOfASlowNetwork : public StalledTileReaderOfALimitedRate {
+ protected:
+  StalledTileReaderOfASlowNetwork() : StalledTileReaderOfALimitedRate(2000) {}
+};
+
+TEST_F(StalledTileReaderOfASlowNetwork, ATileThatKeepsChangingDoesNotKeepTheEntriesOfOthers) {
+  constexpr int tiles = 5;
+  constexpr std::size_t voxels = 1;
+  publisher_.publish(row_of_tiles(tiles, 1, voxels), Eigen::Vector2d::Zero());
+  ASSERT_EQ(publisher_.waiting(), 0U);
+  const auto row = row_of_tiles(tiles, 2, voxels);
+  std::uint64_t revision = 2;
+  const auto began = Clock::now();
+  while (said_.size() < tiles && Clock::now() - began < 6s) {
+    publisher_.publish(with_first_changed(*row, ++revision, voxels), Eigen::Vector2d::Zero());
+    take_since(2, tiles, 50ms);
+  }
+  EXPECT_EQ(said_.size(), static_cast<std::size_t>(tiles));
 }
 
 /// Of a map much larger than its window.
