@@ -98,50 +98,52 @@ bool are_on_path(const Trajectory& poses, const std::vector<StampedPose>& path) 
   });
 }
 
-TEST(LoopService, APlaceSeenAgainCorrectsTheMapThatIsServedAndStored) {
-  if (slowdown > 1) GTEST_SKIP() << "1250 scans take an hour under a sanitizer";
-  const ServiceSetup setup("every");
-  setup.add("labels: {source: none}\noccupancy: {enabled: false}\n");
-  ServerProcess server(setup.server_arguments());
-  Client client(setup.client());
-  client.wait_for_server(patience);
-  Follower follower(client);
-  std::mutex mutex;
-  std::vector<StampedPose> as_published;
-  const Subscription odometry = client.subscribe_odometry([&](const OdometryUpdate& update) {
-    const std::scoped_lock lock(mutex);
-    as_published.push_back(update.pose);
-  });
-  ScanPublisher publisher(setup.publisher(true));
-  ASSERT_TRUE(publisher.wait_for_subscriber(patience));
-  TruePoses truth;
-  drive_rounds(two_rounds(), 0, two_rounds().scans, client, publisher, truth);
-  wait_for_the_last_correction(client);
-  EXPECT_GT(client.status().counter("loops_closed"), 0U);
+/// What the odometry topic brings, as it was published.
+class PublishedOdometry {
+ public:
+  explicit PublishedOdometry(Client& client)
+      : subscription_(client.subscribe_odometry([this](const OdometryUpdate& update) {
+          const std::scoped_lock lock(mutex_);
+          poses_.push_back(update.pose);
+        })) {}
+  [[nodiscard]] std::vector<StampedPose> poses() {
+    const std::scoped_lock lock(mutex_);
+    return poses_;
+  }
 
-  // Who joins now is told where the submaps lie, as the map has them.
+ private:
+  std::mutex mutex_;
+  std::vector<StampedPose> poses_;
+  Subscription subscription_;
+};
+
+/// Who joins now is told where the submaps lie, as the map has them.
+SubmapsOfMap submaps_of_a_new_subscriber(Client& client) {
+  std::mutex mutex;
   SubmapsOfMap submaps;
   const Subscription joining = client.subscribe_submaps([&](const SubmapsOfMap& arrived) {
     const std::scoped_lock lock(mutex);
     submaps = arrived;
   });
-  ASSERT_TRUE(eventually([&] {
+  EXPECT_TRUE(eventually([&] {
     const std::scoped_lock lock(mutex);
     return submaps.list.graph_revision > 0 && !submaps.list.loops.empty();
   }));
+  const std::scoped_lock lock(mutex);
+  return submaps;
+}
 
-  // Who followed the map through the correction has what the file has.
-  static_cast<void>(client.save_map());
-  const SavedMap saved = open_map_file(setup.map_file())->load();
+/// Who followed the map through the correction has what the file has.
+void expect_tiles_as_stored(Follower& follower, const SavedMap& saved) {
   std::map<TileId, std::uint64_t> stored;
   for (const auto& tile : saved.view.tiles) stored[tile->info.id] = tile->info.content_hash;
   EXPECT_TRUE(eventually([&] { return follower.hashes() == stored; }))
       << follower.hashes().size() << " and " << stored.size() << " tiles";
+}
 
-  const std::vector<StampedPose> path(saved.trajectory.begin(), saved.trajectory.end());
-  ASSERT_EQ(path.size(), truth.size());
-
-  // The path that is published is the corrected one, also when no scan comes any more.
+/// The path that is published is the corrected one, also when no scan comes any more.
+void expect_published_path_on(Client& client, const std::vector<StampedPose>& path) {
+  std::mutex mutex;
   Trajectory published;
   const Subscription paths = client.subscribe_path([&](const Trajectory& arrived) {
     const std::scoped_lock lock(mutex);
@@ -151,17 +153,45 @@ TEST(LoopService, APlaceSeenAgainCorrectsTheMapThatIsServedAndStored) {
     const std::scoped_lock lock(mutex);
     return !published.empty() && are_on_path(published, path);
   }));
-  const std::scoped_lock lock(mutex);
+}
+
+Trajectory poses_of(const SubmapsOfMap& submaps) {
+  Trajectory poses;
+  for (const SubmapList::Entry& submap : submaps.list.submaps) {
+    poses.push_back({submap.stamp_ns, submap.T_map_submap});
+  }
+  return poses;
+}
+
+TEST(LoopService, APlaceSeenAgainCorrectsTheMapThatIsServedAndStored) {
+  if (slowdown > 1) GTEST_SKIP() << "1250 scans take an hour under a sanitizer";
+  const ServiceSetup setup("every");
+  setup.add("labels: {source: none}\noccupancy: {enabled: false}\n");
+  ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  Follower follower(client);
+  PublishedOdometry as_published(client);
+  ScanPublisher publisher(setup.publisher(true));
+  ASSERT_TRUE(publisher.wait_for_subscriber(patience));
+  TruePoses truth;
+  drive_rounds(two_rounds(), 0, two_rounds().scans, client, publisher, truth);
+  wait_for_the_last_correction(client);
+  EXPECT_GT(client.status().counter("loops_closed"), 0U);
+
+  const SubmapsOfMap submaps = submaps_of_a_new_subscriber(client);
+  static_cast<void>(client.save_map());
+  const SavedMap saved = open_map_file(setup.map_file())->load();
+  expect_tiles_as_stored(follower, saved);
+  const std::vector<StampedPose> path(saved.trajectory.begin(), saved.trajectory.end());
+  ASSERT_EQ(path.size(), truth.size());
+  expect_published_path_on(client, path);
   EXPECT_EQ(submaps.map_id, saved.view.map_id);
   EXPECT_EQ(submaps.list.graph_revision, corrections(client));
   EXPECT_GT(submaps.list.submaps.size(), 4U);
-  Trajectory submap_poses;
-  for (const SubmapList::Entry& submap : submaps.list.submaps) {
-    submap_poses.push_back({submap.stamp_ns, submap.T_map_submap});
-  }
-  EXPECT_TRUE(are_on_path(submap_poses, path));
+  EXPECT_TRUE(are_on_path(poses_of(submaps), path));
   // Odometry alone drifts little here: by less than 0.1 m.
-  EXPECT_LT(error_m(path, truth), error_m(as_published, truth));
+  EXPECT_LT(error_m(path, truth), error_m(as_published.poses(), truth));
   EXPECT_LT(error_m(path, truth), 0.12);
 }
 
