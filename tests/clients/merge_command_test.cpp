@@ -62,6 +62,11 @@ TEST_F(MergeCommandTest, NamesWhatItCannotMerge) {
   SavedMap pathless = open_map_file(map("b"))->load();
   pathless.trajectory = {};
   open_map_file(folder_ / "pathless.stillmap")->save(pathless);
+  // What a server saved before it mapped on, with the id of another start.
+  SavedMap backup = open_map_file(map("a"))->load();
+  backup.view.map_id += 1;
+  backup.trajectory.truncate(60);
+  open_map_file(folder_ / "backup.stillmap")->save(backup);
   StaticMapConfig coarse;
   coarse.voxel_size_m = 0.4;
   StaticMap coarse_map(coarse);
@@ -79,6 +84,8 @@ TEST_F(MergeCommandTest, NamesWhatItCannotMerge) {
            std::pair{map("a") + " " + path("pathless.stillmap"), std::string("has no path")},
            std::pair{map("a") + " " + path("coarse.stillmap"), std::string("voxels of 0.4 m")},
            std::pair{map("a") + " " + map("a"), std::string("has session 1")},
+           std::pair{map("a") + " " + path("backup.stillmap"), std::string("has session 1")},
+           std::pair{path("backup.stillmap") + " " + map("a"), std::string("has session 1")},
            std::pair{map("a") + " " + map("b") + " --config " + path("text.stillmap"),
                      std::string("text.stillmap")},
        }) {

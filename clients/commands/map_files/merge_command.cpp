@@ -21,6 +21,7 @@
 #include "core/map/storage/fresh_map_file.hpp"
 #include "core/map/storage/map_lock.hpp"
 #include "core/map/storage/map_sessions.hpp"
+#include "core/session/common_drive.hpp"
 #include "core/session/map_merge.hpp"
 
 namespace stillmap::cli {
@@ -61,20 +62,10 @@ void check_out(const MergeArguments& arguments) {
   }
 }
 
-/// From a session's first pose to its last one; nothing for what has no way.
-std::optional<Eigen::Isometry3d> way_of(const MapSession& session, const SharedTrajectory& path) {
-  if (session.poses < 2) return std::nullopt;
-  const std::size_t last = session.first_pose + session.poses - 1;
-  return path[session.first_pose].T_map_lidar.inverse() * path[last].T_map_lidar;
-}
-
-/// The same drive: neither stamps nor poses of two drives are the same to the last digit.
-bool are_one(const MapSession& a, const SharedTrajectory& path_a, const MapSession& b,
-             const SharedTrajectory& path_b) {
-  const auto way_a = way_of(a, path_a), way_b = way_of(b, path_b);
-  return way_a && way_b && a.poses == b.poses &&
-         a.last_stamp_ns - a.first_stamp_ns == b.last_stamp_ns - b.first_stamp_ns &&
-         way_a->isApprox(*way_b, 1e-9);
+Trajectory path_of(const MapSession& session, const SharedTrajectory& path) {
+  Trajectory poses;
+  for (std::size_t i = 0; i < session.poses; ++i) poses.push_back(path[session.first_pose + i]);
+  return poses;
 }
 
 /// Throws std::invalid_argument where what one map is of is in the other one: it would count twice.
@@ -87,7 +78,10 @@ void check_apart(const EarlierMap& map, const EarlierMap& other) {
   };
   for (const MapSession& of_map : read_map_sessions(map.file())) {
     for (const MapSession& of_other : read_map_sessions(other.file())) {
-      if (!are_one(of_map, map.saved().trajectory, of_other, other.saved().trajectory)) continue;
+      if (!are_of_one_drive(path_of(of_map, map.saved().trajectory),
+                            path_of(of_other, other.saved().trajectory))) {
+        continue;
+      }
       throw_shared("session " + std::to_string(of_map.number) +
                    (of_map.source.empty() ? "" : " (" + of_map.source + ")"));
     }
