@@ -58,6 +58,17 @@ TEST_F(MapToolsTest, InfoSaysWhatAFileHolds) {
                               HasSubstr("sensor: by hand")));
 }
 
+TEST_F(MapToolsTest, AClockThatWasSetBackIsSaidAndIsNoSession) {
+  save_street("street.stillmap", true);
+  EXPECT_EQ(run("sessions " + path("street.stillmap")).out.find("set back"), std::string::npos);
+  SavedMap saved = open_map_file(path("street.stillmap"))->load();
+  saved.trajectory = {StampedPose{.stamp_ns = 9'000'000'000}, {.stamp_ns = 1'000'000'000}};
+  open_map_file(path("back.stillmap"))->save(saved);
+  EXPECT_THAT(run("sessions " + path("back.stillmap")).out,
+              HasSubstr("the clock of session 1 was set back"));
+  EXPECT_THAT(run("map-check " + path("back.stillmap")).out, HasSubstr("2 poses of 1 session\n"));
+}
+
 TEST_F(MapToolsTest, CheckTellsSoundFromDamagedByItsExitCode) {
   save_street("street.stillmap", true);
   const ProcessResult sound = run("map-check " + path("street.stillmap"));

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "core/map/storage/map_file_copy.hpp"
+#include "core/map/storage/map_sessions.hpp"
 #include "core/map/storage/tile_codec.hpp"
 #include "tests/map/saved_maps.hpp"
 #include "tests/scratch_folder.hpp"
@@ -130,12 +131,23 @@ TEST_F(MapCheckTest, NamesTilesOfOtherSizesThanTheMaps) {
   EXPECT_THAT(check.faults.at(0).what, HasSubstr("its map has"));
 }
 
-TEST_F(MapCheckTest, ARunMayBeginBeforeTheLastOneEnded) {
+TEST_F(MapCheckTest, AClockThatWasSetBackBeginsNoSession) {
   EXPECT_EQ(check_map_file(file_).sessions, 1U);
   alter("UPDATE trajectory SET stamp_ns = 0 WHERE position = 4");
   const MapCheck check = check_map_file(file_);
   EXPECT_TRUE(check.is_sound());
-  EXPECT_EQ(check.sessions, 2U);
+  EXPECT_EQ(check.sessions, 1U);
+}
+
+TEST_F(MapCheckTest, CountsTheSessionsThatAreListed) {
+  SavedMap after = saved_;
+  after.trajectory.push_back({after.trajectory.back().stamp_ns - 1, Eigen::Isometry3d::Identity()});
+  after.trajectory.push_back({after.trajectory.back().stamp_ns - 1, Eigen::Isometry3d::Identity()});
+  after.view.map_id += 1;
+  after.view.version += 1;
+  add_map_session(file_, after, {.source = "tuesday"});
+  EXPECT_EQ(check_map_file(file_).sessions, 2U);
+  EXPECT_EQ(read_map_sessions(file_).size(), 2U);
 }
 
 TEST_F(MapCheckTest, NamesPosesThatCannotBe) {

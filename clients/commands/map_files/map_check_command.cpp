@@ -56,7 +56,8 @@ std::string describe(const MapCheck& check) {
   for (const MapFault& fault : check.faults) text += describe(fault) + "\n";
   const std::string looked_at =
       std::to_string(check.tiles) + " tiles, " + std::to_string(check.voxels) + " voxels, " +
-      std::to_string(check.poses) + " poses of " + std::to_string(check.sessions) + " runs";
+      std::to_string(check.poses) + " poses of " + std::to_string(check.sessions) +
+      (check.sessions == 1 ? " session" : " sessions");
   if (check.is_sound()) return "valid: " + looked_at + "\n";
   return text + "damaged: " + std::to_string(check.faults.size()) + " faults in " + looked_at +
          "; " + std::to_string(check.sound_tiles) +

@@ -51,7 +51,13 @@ std::string sessions_table(const std::vector<MapSession>& sessions) {
                seconds(session.first_stamp_ns), seconds(session.last_stamp_ns),
                session.closures == 0 ? "-" : std::to_string(session.closures)});
   }
-  return table.text();
+  std::string text = table.text();
+  for (const MapSession& session : sessions) {
+    if (session.last_stamp_ns >= session.first_stamp_ns) continue;
+    text += "the clock of session " + std::to_string(session.number) +
+            " was set back while it was mapped: its last pose has the earlier stamp\n";
+  }
+  return text;
 }
 
 /// Throws std::invalid_argument where the session cannot be withdrawn into this file.

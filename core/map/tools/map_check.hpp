@@ -28,8 +28,7 @@ struct MapCheck {
   /// Voxels that are known and not shown.
   std::uint64_t hidden_voxels = 0;
   std::size_t poses = 0;
-  /// Runs that the path is of: each begins at the start or with a pose that is not later than the
-  /// one before.
+  /// Those that the path is of, as `read_map_sessions` lists them.
   std::size_t sessions = 0;
   /// Tiles that a server could still serve.
   std::size_t sound_tiles = 0;
