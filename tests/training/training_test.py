@@ -224,9 +224,9 @@ class Aim(unittest.TestCase):
 
 
 class FewScans:
-    """One scan of a wall all round, of a sensor with four rings."""
+    """One scan of a wall all round in four rows, of a sensor whose beams fill any width."""
 
-    images = [ImageModel(4, 64, 10, -10)]
+    images = [ImageModel(4, 64, 10, -10, 64)]
 
     def read(self, index):
         azimuth = np.linspace(-np.pi, np.pi, 2000)
