@@ -50,7 +50,7 @@ class TokenBucket {
 /// longer than a lease): Fast DDS 2.9 readers abort when they have some fragments of a keyed sample
 /// and are then told that the rest will not come. Entries do not wait for that: a reader of tiles
 /// that was stopped would keep them from all others. The entry of a tile that waits is written at
-/// once, and again after its voxels; it takes as much of a limited rate as they do.
+/// once, and again after its voxels; of a limited rate it takes its own bytes alone.
 class TilePublisher {
  public:
   /// Tiles outside the window that late joiners get, too.

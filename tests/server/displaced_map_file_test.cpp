@@ -111,6 +111,15 @@ class DisplacedMapFile : public testing::Test, public CheckpointSource {
     const std::string content = content_of(folder_ / "backup.stillmap");
     std::ofstream(file_, std::ios::binary | std::ios::trunc) << content;
   }
+  /// Saves a map whose file was damaged while tiles of it lay there alone.
+  fs::path saved_after_damage() {
+    map_scan(30.0F);
+    saver_.save_if_changed();
+    evict_all();
+    map_scan(50.0F);
+    std::ofstream(file_, std::ios::binary | std::ios::trunc) << "no map";
+    return saver_.save_as("");
+  }
   [[nodiscard]] std::uint64_t displaced() const {
     dds::ServerStatus status;
     statistics_.report_to(status);
@@ -200,12 +209,7 @@ TEST_F(DisplacedMapFile, AnEarlierStateOfItselfThatIsCopiedOverItStays) {
 }
 
 TEST_F(DisplacedMapFile, OfADamagedFileTheMapInMemoryIsKept) {
-  map_scan(30.0F);
-  saver_.save_if_changed();
-  evict_all();
-  map_scan(50.0F);
-  std::ofstream(file_, std::ios::binary | std::ios::trunc) << "no map";
-  const fs::path saved = saver_.save_as("");
+  const fs::path saved = saved_after_damage();
   EXPECT_NE(saved, file_);
   EXPECT_EQ(content_of(file_), "no map");
   EXPECT_THAT(tiles_in(saved), testing::ElementsAre(2)) << "the rest was in the file alone";
@@ -313,12 +317,7 @@ TEST_F(DisplacedMapFile, TheStatusSaysSoUntilTheOperatorLoads) {
 }
 
 TEST_F(DisplacedMapFile, ATileThatWasLostAndMappedAnewStays) {
-  map_scan(30.0F);
-  saver_.save_if_changed();
-  evict_all();
-  map_scan(50.0F);
-  std::ofstream(file_, std::ios::binary | std::ios::trunc) << "no map";
-  const fs::path saved = saver_.save_as("");
+  const fs::path saved = saved_after_damage();
   map_scan(5.0F);
   map_scan(5.0F);
   saver_.save_as("");

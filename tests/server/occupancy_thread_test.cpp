@@ -142,13 +142,20 @@ std::shared_ptr<const MapSnapshot> map_of_a_room() {
   return map.view();
 }
 
-TEST_F(GatedOccupancyThreadTest, WaitsForTheOctreeOfAMapThatBeginsWithVoxels) {
+/// Asked while the octree of a map that has just begun cannot be made.
+class BegunOccupancyThreadTest : public GatedOccupancyThreadTest {
+ protected:
+  std::future<BoxOccupancy> asked_as_it_begins(server::OccupancyThread& thread) {
+    set_open(false);
+    thread.begin(map_of_a_room());
+    EXPECT_TRUE(waits());
+    return std::async(std::launch::async, [&thread] { return all_of(thread); });
+  }
+};
+
+TEST_F(BegunOccupancyThreadTest, WaitsForTheOctreeOfAMapThatBeginsWithVoxels) {
   server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate(), scheduling);
-  set_open(false);
-  thread.begin(map_of_a_room());
-  ASSERT_TRUE(waits());
-  std::future<BoxOccupancy> asked =
-      std::async(std::launch::async, [&thread] { return all_of(thread); });
+  std::future<BoxOccupancy> asked = asked_as_it_begins(thread);
   EXPECT_EQ(asked.wait_for(100ms), std::future_status::timeout) << "nothing known is no answer";
   set_open(true);
   EXPECT_GT(asked.get().occupied, 100U);
@@ -172,13 +179,9 @@ TEST_F(GatedOccupancyThreadTest, RefusesAllWhoAskForAnOctreeThatIsNotMadeWithinO
   EXPECT_GT(all_of(thread).occupied, 100U);
 }
 
-TEST_F(GatedOccupancyThreadTest, AnEmptyMapThatBeginsIsAnsweredFromAtOnce) {
+TEST_F(BegunOccupancyThreadTest, AnEmptyMapThatBeginsIsAnsweredFromAtOnce) {
   server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate(), scheduling);
-  set_open(false);
-  thread.begin(map_of_a_room());
-  ASSERT_TRUE(waits());
-  std::future<BoxOccupancy> asked =
-      std::async(std::launch::async, [&thread] { return all_of(thread); });
+  std::future<BoxOccupancy> asked = asked_as_it_begins(thread);
   EXPECT_EQ(asked.wait_for(100ms), std::future_status::timeout);
   thread.begin(StaticMap{StaticMapConfig{}}.view());
   EXPECT_EQ(asked.wait_for(1s), std::future_status::ready);
