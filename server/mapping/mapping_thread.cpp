@@ -47,6 +47,9 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
           outputs.place_finder != nullptr ? mapper_config_beside_finder(config) : config.mapper,
           outputs.open_segmenter, queue, statistics),
       is_live_(config.input.delivery == DeliveryMode::latest),
+      named_sensor_(config.automatic_sensor.is_on
+                        ? nullptr
+                        : std::make_shared<const SensorModel>(config.mapper.sensor)),
       sensor_period_s_(config.mapper.sensor.period_s),
       publish_period_(config.publish.tiles_period_s),
       queue_(queue),
@@ -100,6 +103,10 @@ bool MappingThread::tells_lidar(const std::shared_ptr<const SensorModel>& sensor
 
 bool MappingThread::leans_by_published_mount() const {
   return !frames_.is_configured() && !LidarTilt(frames_.T_base_lidar().linear()).is_upright();
+}
+
+std::shared_ptr<const SensorModel> MappingThread::sensor_of(const QueuedScan& queued) const {
+  return queued.sensor || !leans_by_published_mount() ? queued.sensor : named_sensor_;
 }
 
 bool MappingThread::use_sensor(const std::shared_ptr<const SensorModel>& sensor) {
@@ -336,8 +343,8 @@ void MappingThread::map(QueuedScan queued) {
   const std::int64_t stamp_ns = queued.scan.stamp_ns;
   // Before the labels are opened, whose images are of the lidar as it stands there.
   if (!locate_lidar(queued)) return drop({"unknown_frame", frames_.missing()});
-  if (use_sensor(queued.sensor) && is_live_ && queue_.waiting() > 0)
-    return drop({"sensor_told", "the network was made ready for the lidar that this scan told"});
+  if (use_sensor(sensor_of(queued)) && is_live_ && queue_.waiting() > 0)
+    return drop({"sensor_told", "the network was made ready for the lidar of this scan"});
   mapper_.set_mount(frames_.T_base_lidar());
   // A clock that is being set back: a correction, which tells times apart, is to meet none of after
   // that. Now no scan waits for it: none is mapped until the mapper believes the clock.

@@ -132,6 +132,8 @@ class MappingThread : public CheckpointSource {
   [[nodiscard]] bool tells_lidar(const std::shared_ptr<const SensorModel>& sensor) const;
   /// Whether it leans as /tf_static tells, which nobody knew when the first labels were opened.
   [[nodiscard]] bool leans_by_published_mount() const;
+  /// The lidar that the mapper is to work for from this scan on; null: as before.
+  [[nodiscard]] std::shared_ptr<const SensorModel> sensor_of(const QueuedScan& queued) const;
   /// Goes on for this lidar, with the map and where the last pose was. False where it does already,
   /// or nothing is known of it.
   bool use_sensor(const std::shared_ptr<const SensorModel>& sensor);
@@ -196,7 +198,9 @@ class MappingThread : public CheckpointSource {
   MapperFactory factory_;
   bool is_live_;
   bool is_map_frozen_ = false;
-  /// The lidar that its scans told.
+  /// The one that the configuration names; null where scans tell it.
+  std::shared_ptr<const SensorModel> named_sensor_;
+  /// The lidar that its scans told, or the named one once labels were opened for how it leans.
   std::shared_ptr<const SensorModel> sensor_;
   double sensor_period_s_;
   std::chrono::duration<double> publish_period_;

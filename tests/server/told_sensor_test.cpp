@@ -53,6 +53,18 @@ class ToldSensor : public testing::Test {
     mapping_.emplace(config_, std::make_unique<PassthroughSegmenter>(), std::nullopt, nullptr,
                      queue_, statistics_, latest_map_, helpers);
   }
+  /// On /tf_static, of a lidar for which the network was opened as of an upright one.
+  void tell_mount(double pitch_rad) {
+    config_.frames.base = "base_link";
+    config_.mount.source = MountConfig::Source::tf_static;
+    config_.mount.wait_s = 60.0;
+    config_.mapper.sensor = vlp_16();
+    robot_.emplace(statistics_);
+    T_base_lidar_published_ = Eigen::Translation3d(0.5, 0.0, 1.2) *
+                              Eigen::AngleAxisd(pitch_rad, Eigen::Vector3d::UnitY());
+    ASSERT_TRUE(
+        robot_->writer.write(wire::to_tf(0, {{"base_link", "lidar", T_base_lidar_published_}})));
+  }
   /// Sends so many scans and waits until they are worked off.
   void drive(int scans, const std::shared_ptr<const SensorModel>& sensor) {
     for (int k = 0; k < scans; ++k)
@@ -93,6 +105,7 @@ class ToldSensor : public testing::Test {
   std::vector<std::string> opened_;
   bool fails_ = false;
   bool are_labelled_ = true;
+  Eigen::Isometry3d T_base_lidar_published_ = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d T_base_lidar_opened_ = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d T_base_lidar_told_ = Eigen::Isometry3d::Identity();
   std::shared_ptr<const SensorModel> told_ = std::make_shared<const SensorModel>(vlp_16());
@@ -139,19 +152,29 @@ TEST_F(ToldSensor, HasItsMountToldToWhatLabelsItsScans) {
 }
 
 TEST_F(ToldSensor, HasLabelsOpenedForItWhereItsRobotTellsThatItSits) {
-  config_.frames.base = "base_link";
-  config_.mount.source = MountConfig::Source::tf_static;
-  config_.mount.wait_s = 60.0;
-  // The network that is there was opened for one that stands upright.
-  config_.mapper.sensor = vlp_16();
-  robot_.emplace(statistics_);
-  const Eigen::Isometry3d T_base_lidar =
-      Eigen::Translation3d(0.5, 0.0, 1.2) * Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY());
-  ASSERT_TRUE(robot_->writer.write(wire::to_tf(0, {{"base_link", "lidar", T_base_lidar}})));
+  tell_mount(0.3);
   start();
   drive(2, told_);
   EXPECT_THAT(opened_, ElementsAre("VLP-16"));
-  EXPECT_TRUE(T_base_lidar_opened_.isApprox(T_base_lidar, 1e-6));
+  EXPECT_TRUE(T_base_lidar_opened_.isApprox(T_base_lidar_published_, 1e-6));
+}
+
+TEST_F(ToldSensor, NamedHasLabelsOpenedOnceForHowItsRobotTellsThatItLeans) {
+  config_.automatic_sensor.is_on = false;
+  tell_mount(0.3);
+  start();
+  drive(4, nullptr);
+  EXPECT_THAT(opened_, ElementsAre("VLP-16"));
+  EXPECT_TRUE(T_base_lidar_opened_.isApprox(T_base_lidar_published_, 1e-6));
+  EXPECT_EQ(status().counter("scans_mapped"), 4U);
+}
+
+TEST_F(ToldSensor, NamedAndUprightKeepsItsLabels) {
+  config_.automatic_sensor.is_on = false;
+  tell_mount(0.0);
+  start();
+  drive(2, nullptr);
+  EXPECT_THAT(opened_, IsEmpty());
 }
 
 TEST_F(ToldSensor, LateGoesOnInTheMapWhereItIs) {
