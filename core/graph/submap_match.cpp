@@ -53,6 +53,8 @@ std::optional<SubmapMatch> match_submaps(const PlacedSubmap& a, const PlacedSubm
                                          const AlignmentWindow& window,
                                          const SubmapMatchConfig& config) {
   const PlanAlignments aligned = align_in_plan(a.image, b.image, in_plan(T_a_b_expected), window);
+  // Where nothing that stands up meets, no place is the best.
+  if (!(aligned.best.score > 0.0)) return std::nullopt;
   const auto offset_m = ground_offset_m(a.image, b.image, aligned.best.T_a_b);
   if (!offset_m) return std::nullopt;
 

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/graph/earlier_map.hpp"
+#include "core/graph/submap_match.hpp"
 #include "core/graph/submap_registration.hpp"
 #include "core/odometry/se3.hpp"
 #include "tests/graph/street_world.hpp"
@@ -69,6 +71,41 @@ TEST(SubmapTarget, FindsTheMotionBetweenSubmapsOfOnePlace) {
   EXPECT_LT(boxminus(found.T_map_lidar, expected).head<3>().norm(), 0.03);
   EXPECT_LT(boxminus(found.T_map_lidar, expected).tail<3>().norm(), 0.003);
   EXPECT_GT(found.upright_fit, 0.6);
+}
+
+/// Lanes of equal houses: the other lane, farther away than odometry can have drifted, was tried.
+TEST(SubmapMatch, WhereNothingInTheWindowMeetsNothingIsFound) {
+  const StreetWorld world(3);
+  const PlacedSubmap a(world.submap_at(0.0, 25.0, false, 1));
+  const PlacedSubmap b(world.submap_at(0.0, 25.0, false, 2));
+  const AlignmentWindow window{.reach_m = 2.0};
+  const auto match_from = [&](double away_m) {
+    return match_submaps(a, b, Eigen::Isometry3d(Eigen::Translation3d(away_m, 0.0, 0.0)), window,
+                         {});
+  };
+  const auto here = match_from(0.0);
+  ASSERT_TRUE(here);
+  EXPECT_EQ(here->refusal, "");
+  EXPECT_FALSE(match_from(150.0));
+}
+
+/// Each place of a drive in a map is looked for from the one before: in rotations, rounding grew by
+/// three with every match.
+TEST(EarlierMap, PosesThatFollowFromOneAnotherStayRigid) {
+  const StreetWorld world(5);
+  const EarlierMap map(world.earlier_map(-30.0, 60.0, 7));
+  const Submap submap = world.submap_at(0.0, 25.0, false, 2);
+  Eigen::Isometry3d T_map_key =
+      world.T_map_lidar_at(0.0, false).inverse() * world.T_map_lidar_at(12.0, false);
+  T_map_key.linear() *= 1.0 + 1e-7;
+  for (int k = 0; k < 4; ++k) {
+    const auto found = map.match(submap, T_map_key, 10.0);
+    ASSERT_TRUE(found);
+    EXPECT_EQ(found->match.refusal, "");
+    T_map_key = found->T_map_key;
+    const Eigen::Matrix3d R = T_map_key.linear();
+    EXPECT_LT((R * R.transpose() - Eigen::Matrix3d::Identity()).norm(), 1e-12);
+  }
 }
 
 }  // namespace
