@@ -36,6 +36,8 @@ class LendableMap {
       : map_(config), sensor_(sensor) {}
 
   void insert(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar);
+  /// Of the next scans.
+  void use_sensor(const SensorModel& sensor) { sensor_ = sensor; }
   /// A scan of MapEntry::waits.
   void let_wait(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar);
   /// What becomes of those by the entry of the next scan, before that is inserted: they are

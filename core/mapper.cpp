@@ -87,6 +87,14 @@ Mapper::Mapper(const MapperConfig& config, std::unique_ptr<SegmentationPipeline>
       odometry_(config.odometry, config.sensor),
       static_map_(config.static_map, config.sensor) {}
 
+void Mapper::use_sensor(const MapperConfig& config,
+                        std::unique_ptr<SegmentationPipeline> segmentation) {
+  config_ = checked(config);
+  label_synchronizer_ = LabelSynchronizer(std::move(segmentation), config.sensor);
+  odometry_.use_sensor(config.sensor);
+  static_map_.use_sensor(config.sensor);
+}
+
 std::optional<MappedScan> Mapper::process(
     Scan raw_scan, const std::optional<Eigen::Isometry3d>& T_map_lidar_prior) {
   if (!accepts(raw_scan)) return std::nullopt;

@@ -155,6 +155,12 @@ class Mapper {
     return static_map_.map().view();
   }
 
+  /// The next scans are of another lidar at the same place on the robot, or of the same one by
+  /// another description, with labels from another source: poses and map go on. `config` differs
+  /// in `sensor` and `prepare` alone; throws std::invalid_argument with its faults, and nothing has
+  /// changed then. Labels that are still to come are lost.
+  void use_sensor(const MapperConfig& config, std::unique_ptr<SegmentationPipeline> segmentation);
+
   /// Whether a scan was registered since the map began or the lidar was relocated: before, nothing
   /// but its prior tells where it is.
   [[nodiscard]] bool is_placed() const { return is_placed_; }

@@ -41,7 +41,8 @@ Eigen::Isometry3d Odometry::motion_during(double period_s) const {
 }
 
 bool Odometry::uses_rings() const {
-  return !is_registered_by_surfaces(state_->sensor, state_->config);
+  const bool begins_by_rings = !is_registered_by_surfaces(state_->sensor, state_->config);
+  return begins_by_rings || !state_->is_by_surfaces;
 }
 
 Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
@@ -115,6 +116,16 @@ void Odometry::begin_in(PriorMap prior) {
   state.map = std::move(prior.local_map);
   if (!state.is_by_surfaces) state.ring_start.set_prior_map(prior.points_map);
   state.prior_map = std::move(prior.points_map);
+}
+
+void Odometry::use_sensor(const SensorModel& sensor) {
+  State& state = *state_;
+  state.sensor = sensor;
+  state.intervals.set_period(sensor.period_s);
+  const bool begins_by_surfaces = is_registered_by_surfaces(sensor, state.config);
+  // A map that was begun by rings goes on by surfaces once RingStart has it from enough places.
+  const bool has_rings = sensor.pattern == ScanPattern::rings;
+  if (!state.started || !has_rings) state.is_by_surfaces = begins_by_surfaces;
 }
 
 void Odometry::set_clock(std::int64_t shift_ns) {

@@ -68,6 +68,10 @@ class Odometry {
   /// one began.
   void begin_in(PriorMap prior);
 
+  /// The next scans are of another lidar at the same place on the robot, or of the same one by
+  /// another description: local map, velocity and health go on.
+  void use_sensor(const SensorModel& sensor);
+
   /// The clock of the stamps was set: what was stamped before has a stamp so much later by it.
   void set_clock(std::int64_t shift_ns);
 

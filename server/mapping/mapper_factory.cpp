@@ -45,7 +45,9 @@ MapperFactory::MapperFactory(const ServerConfig& config, MapperConfig mapper,
       statistics_(statistics) {}
 
 Mapper MapperFactory::make(std::unique_ptr<Segmenter> segmenter, MapperListeners listeners) const {
-  return make_with(mapper_, std::move(segmenter), std::move(listeners));
+  Mapper made(mapper_, pipeline_of(std::move(segmenter)), std::move(listeners));
+  made.limit_trajectory(mapper_poses);
+  return made;
 }
 
 void MapperFactory::tell_of_better_model(const SensorModel& sensor) const {
@@ -58,13 +60,13 @@ void MapperFactory::tell_of_better_model(const SensorModel& sensor) const {
   }
 }
 
-Mapper MapperFactory::make_for(const SensorModel& sensor, const Eigen::Isometry3d& T_base_lidar,
-                               MapperListeners listeners) const {
-  MapperConfig mapper = mapper_;
-  if (const auto fault = range_fault(sensor, automatic_, mapper.prepare))
+void MapperFactory::use_sensor(const SensorModel& sensor, const Eigen::Isometry3d& T_base_lidar,
+                               Mapper& mapper) const {
+  MapperConfig config = mapper_;
+  if (const auto fault = range_fault(sensor, automatic_, config.prepare))
     spdlog::warn("prepare.{} {}; until then both ranges are the lidar's", fault->field,
                  fault->text);
-  use_sensor(sensor, automatic_, mapper);
+  stillmap::use_sensor(sensor, automatic_, config);
   std::unique_ptr<Segmenter> segmenter;
   try {
     segmenter = open_segmenter_(sensor, T_base_lidar);
@@ -76,16 +78,12 @@ Mapper MapperFactory::make_for(const SensorModel& sensor, const Eigen::Isometry3
     segmenter = std::make_unique<UnavailableSegmenter>(why);
     if (may_come_with_scans) segmenter = std::make_unique<FallbackSegmenter>(std::move(segmenter));
   }
-  return make_with(mapper, std::move(segmenter), std::move(listeners));
+  mapper.use_sensor(config, pipeline_of(std::move(segmenter)));
 }
 
-Mapper MapperFactory::make_with(const MapperConfig& mapper, std::unique_ptr<Segmenter> segmenter,
-                                MapperListeners listeners) const {
-  Mapper made(mapper,
-              std::make_unique<AsyncSegmenter>(std::move(segmenter), budget_, queue_, statistics_),
-              std::move(listeners));
-  made.limit_trajectory(mapper_poses);
-  return made;
+std::unique_ptr<SegmentationPipeline> MapperFactory::pipeline_of(
+    std::unique_ptr<Segmenter> segmenter) const {
+  return std::make_unique<AsyncSegmenter>(std::move(segmenter), budget_, queue_, statistics_);
 }
 
 }  // namespace stillmap::server

@@ -18,7 +18,8 @@ namespace stillmap::server {
 using OpenSegmenter = std::function<std::unique_ptr<Segmenter>(
     const SensorModel& sensor, const Eigen::Isometry3d& T_base_lidar)>;
 
-/// Makes mappers for the lidar that the configuration names, or for one that its scans have told.
+/// Makes mappers for the lidar that the configuration names, and has them go on for one that its
+/// scans have told.
 class MapperFactory {
  public:
   /// With `mapper`'s settings. Scans that wait in `queue` do so for the mapper, too.
@@ -32,14 +33,15 @@ class MapperFactory {
   [[nodiscard]] bool knows_other_lidars() const { return open_segmenter_ != nullptr; }
   /// Logs where another model would suit this lidar better.
   void tell_of_better_model(const SensorModel& sensor) const;
-  /// For this lidar, with labels that are opened for it; where that fails, with none but those that
-  /// come with scans where they may (labels.source: auto), and the status tells why.
-  [[nodiscard]] Mapper make_for(const SensorModel& sensor, const Eigen::Isometry3d& T_base_lidar,
-                                MapperListeners listeners) const;
+  /// The mapper goes on for this lidar, with labels that are opened for it; where that fails, with
+  /// none but those that come with scans where they may (labels.source: auto), and the status tells
+  /// why.
+  void use_sensor(const SensorModel& sensor, const Eigen::Isometry3d& T_base_lidar,
+                  Mapper& mapper) const;
 
  private:
-  [[nodiscard]] Mapper make_with(const MapperConfig& mapper, std::unique_ptr<Segmenter> segmenter,
-                                 MapperListeners listeners) const;
+  [[nodiscard]] std::unique_ptr<SegmentationPipeline> pipeline_of(
+      std::unique_ptr<Segmenter> segmenter) const;
 
   MapperConfig mapper_;
   AutomaticSensor automatic_;

@@ -117,17 +117,9 @@ bool MappingThread::use_sensor(const std::shared_ptr<const SensorModel>& sensor)
   statistics_.set_sensor(sensor->name);
   factory_.tell_of_better_model(*sensor);
   if (is_configured) return false;
-  end_correction();
-  const bool has_mapped = !mapper_.trajectory().empty();
-  ResumedMap map = mapper_.resume(ResumedMap::of(StaticMap(mapper_config_.static_map)));
-  // What this lidar saw when it was taken for another one is all that it can be registered to.
-  if (has_mapped) map = ResumedMap::of(std::move(map.map));
-  mapper_ = factory_.make_for(*sensor, frames_.T_base_lidar(), listeners());
-  mapper_.keep_confirmed_scans(true);
-  static_cast<void>(mapper_.resume(std::move(map)));
+  factory_.use_sensor(*sensor, frames_.T_base_lidar(), mapper_);
   sensor_period_s_ = sensor->period_s;
   if (outputs_.place_finder != nullptr) outputs_.place_finder->use_sensor(*sensor);
-  if (outputs_.loops != nullptr && has_mapped) set_elsewhere();
   return true;
 }
 
@@ -386,8 +378,7 @@ void MappingThread::drop(const ScanRejection& rejection) {
 }
 
 bool MappingThread::locate_lidar(const QueuedScan& queued) {
-  const bool begins = mapper_.trajectory().empty() || tells_lidar(queued.sensor);
-  if (!frames_.locate_lidar(queued.frame, begins)) return false;
+  if (!frames_.locate_lidar(queued.frame, mapper_.trajectory().empty())) return false;
   const bool is_told = mounted_frame_ == frames_.lidar() || !frames_.is_configured();
   if (is_told || !frames_.has_base() || outputs_.poses == nullptr) return true;
   mounted_frame_ = frames_.lidar();

@@ -134,8 +134,8 @@ class MappingThread : public CheckpointSource {
   [[nodiscard]] bool leans_by_published_mount() const;
   /// The lidar that the mapper is to work for from this scan on; null: as before.
   [[nodiscard]] std::shared_ptr<const SensorModel> sensor_of(const QueuedScan& queued) const;
-  /// Goes on for this lidar, with the map and where the last pose was. False where it does already,
-  /// or nothing is known of it.
+  /// Goes on for this lidar, in map and motion. False where it does already, or nothing is known of
+  /// it.
   bool use_sensor(const std::shared_ptr<const SensorModel>& sensor);
   /// Gives the mapper the IMU's samples up to the scan's last point.
   void feed_imu(const Scan& scan);

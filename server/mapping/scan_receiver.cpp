@@ -277,6 +277,8 @@ void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std:
     statistics_.bad_cloud(from_cloud.fault.counter);
     return drop("bad_cloud", 1, "bad cloud: " + from_cloud.fault.reason);
   }
+  if (std::exchange(lidar->last_frame, frame) != frame) lidar->clouds_of_frame = 0;
+  ++lidar->clouds_of_frame;
   report_labels(*lidar, from_cloud.label_census);
   report(*lidar, cloud_changes, *scan);
   if (sweeps_ != nullptr) return sweeps_->add(lidar->index, *std::move(scan), stop);
@@ -331,6 +333,8 @@ void ScanReceiver::report(Lidar& lidar, const std::string& cloud_changes, const 
 }
 
 void ScanReceiver::recognise(Lidar& lidar, const Scan& scan) {
+  constexpr std::uint64_t clouds_in_a_row = 10;
+  if (lidar.recognition->sensor() && lidar.clouds_of_frame < clouds_in_a_row) return;
   if (!lidar.recognition->learn(scan)) return;
   lidar.sensor = *lidar.recognition->sensor();
   spdlog::info("the lidar, as its scans tell: {}", in_words(lidar.sensor));

@@ -271,5 +271,35 @@ TEST(CrowdedDrives, ARestartInTrafficWithoutLabelsFindsWhereItHasDriven) {
   }
 }
 
+/// Scans are missed while the network is made ready for the lidar that was told, and the lidar
+/// drives on at 12 m/s: a mapper made anew looked for it where it was last, in the few voxels that
+/// it had.
+TEST(CrowdedDrives, GoOnInMotionWithALidarThatIsToldLate) {
+  SimulationConfig config = crowded_street();
+  config.seed = 71;
+  config.scans = 30;
+  const Simulation simulation(config);
+  for (const int told : {4, 12}) {
+    MapperConfig mapper_config;
+    mapper_config.sensor = hdl_64e();
+    Mapper mapper(mapper_config, std::make_unique<PassthroughSegmenter>());
+    for (int k = 0; k < told; ++k) ASSERT_TRUE(mapper.process(simulation.scan(k).scan));
+    mapper_config.sensor = config.sensor;
+    mapper.use_sensor(mapper_config, std::make_unique<BlockingSegmenter>(
+                                         std::make_unique<PassthroughSegmenter>()));
+    constexpr int missed = 3;
+    for (int k = told + missed; k < config.scans; ++k) {
+      const auto mapped = mapper.process(simulation.scan(k).scan);
+      ASSERT_TRUE(mapped);
+      EXPECT_EQ(mapped->odometry.health, OdometryHealth::good) << "scan " << k;
+      const Eigen::Isometry3d T_map_lidar_true =
+          simulation.T_map_lidar_at(0.0).inverse() *
+          simulation.T_map_lidar_at(k * config.sensor.period_s);
+      const Eigen::Isometry3d off = T_map_lidar_true.inverse() * mapped->odometry.T_map_lidar;
+      EXPECT_LT(off.translation().norm(), 0.2) << "scan " << k;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace stillmap

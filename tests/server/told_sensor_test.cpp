@@ -62,8 +62,10 @@ class ToldSensor : public testing::Test {
     robot_.emplace(statistics_);
     T_base_lidar_published_ = Eigen::Translation3d(0.5, 0.0, 1.2) *
                               Eigen::AngleAxisd(pitch_rad, Eigen::Vector3d::UnitY());
+    const Eigen::Isometry3d T_base_other(Eigen::Translation3d(0.0, 0.0, 1.0));
     ASSERT_TRUE(
-        robot_->writer.write(wire::to_tf(0, {{"base_link", "lidar", T_base_lidar_published_}})));
+        robot_->writer.write(wire::to_tf(0, {{"base_link", "lidar", T_base_lidar_published_},
+                                             {"base_link", "other", T_base_other}})));
   }
   /// Sends so many scans and waits until they are worked off.
   void drive(int scans, const std::shared_ptr<const SensorModel>& sensor) {
@@ -189,6 +191,20 @@ TEST_F(ToldSensor, LateGoesOnInTheMapWhereItIs) {
   EXPECT_LT(error_m(), 0.1);
   EXPECT_EQ(latest_map_.trajectory().size(), 24U);
   EXPECT_EQ(status().health, OdometryHealth::good);
+}
+
+TEST_F(ToldSensor, OfAnotherFrameDoesNotTakeTheMapOver) {
+  config_.frames.lidar.clear();
+  tell_mount(0.0);
+  start();
+  drive(3, told_);
+  queue_.push_dropping_oldest(
+      {scan(), "other", Clock::now(), std::make_shared<const SensorModel>(hdl_32e())});
+  drive(2, told_);
+  EXPECT_EQ(status().counter("scans_mapped"), 5U);
+  EXPECT_EQ(status().dropped(), 1U);
+  EXPECT_EQ(status().sensor, "VLP-16");
+  EXPECT_THAT(opened_, IsEmpty());
 }
 
 TEST_F(ToldSensor, WithoutLabelsForItIsMappedWithoutAndSaysWhy) {
