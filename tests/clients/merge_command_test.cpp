@@ -67,6 +67,12 @@ TEST_F(MergeCommandTest, NamesWhatItCannotMerge) {
   backup.view.map_id += 1;
   backup.trajectory.truncate(60);
   open_map_file(folder_ / "backup.stillmap")->save(backup);
+  // As where the first of its sessions is too short to be told.
+  SavedMap later = open_map_file(map("b"))->load();
+  later.view.map_id += 1;
+  const Trajectory whole = later.trajectory.to_vector();
+  later.trajectory = Trajectory(whole.begin() + 5, whole.end());
+  open_map_file(folder_ / "later.stillmap")->save(later);
   StaticMapConfig coarse;
   coarse.voxel_size_m = 0.4;
   StaticMap coarse_map(coarse);
@@ -86,6 +92,8 @@ TEST_F(MergeCommandTest, NamesWhatItCannotMerge) {
            std::pair{map("a") + " " + map("a"), std::string("has session 1")},
            std::pair{map("a") + " " + path("backup.stillmap"), std::string("has session 1")},
            std::pair{path("backup.stillmap") + " " + map("a"), std::string("has session 1")},
+           std::pair{map("b") + " " + path("later.stillmap"), std::string("has session 1")},
+           std::pair{path("later.stillmap") + " " + map("b"), std::string("has session 1")},
            std::pair{map("a") + " " + map("b") + " --config " + path("text.stillmap"),
                      std::string("text.stillmap")},
        }) {

@@ -62,10 +62,14 @@ void check_out(const MergeArguments& arguments) {
   }
 }
 
-Trajectory path_of(const MapSession& session, const SharedTrajectory& path) {
-  Trajectory poses;
-  for (std::size_t i = 0; i < session.poses; ++i) poses.push_back(path[session.first_pose + i]);
-  return poses;
+/// Of the pose at this position of the map's path.
+std::string session_at(const EarlierMap& map, std::size_t pose) {
+  for (const MapSession& session : map.sessions()) {
+    if (pose < session.first_pose || pose - session.first_pose >= session.poses) continue;
+    return "session " + std::to_string(session.number) +
+           (session.source.empty() ? "" : " (" + session.source + ")");
+  }
+  return "a part";
 }
 
 /// Throws std::invalid_argument where what one map is of is in the other one: it would count twice.
@@ -76,15 +80,10 @@ void check_apart(const EarlierMap& map, const EarlierMap& other) {
                                 " in it, whose evidence would count twice: name maps of other "
                                 "drives, or withdraw it from one of them ('stillmap sessions')");
   };
-  for (const MapSession& of_map : read_map_sessions(map.file())) {
-    for (const MapSession& of_other : read_map_sessions(other.file())) {
-      if (!are_of_one_drive(path_of(of_map, map.saved().trajectory),
-                            path_of(of_other, other.saved().trajectory))) {
-        continue;
-      }
-      throw_shared("session " + std::to_string(of_map.number) +
-                   (of_map.source.empty() ? "" : " (" + of_map.source + ")"));
-    }
+  // A map of several sessions is one session of what it was merged into.
+  if (const auto stretch = common_stretch(map.saved().trajectory.to_vector(),
+                                          other.saved().trajectory.to_vector())) {
+    throw_shared(session_at(map, stretch->first_a + stretch->poses / 2));
   }
   // Maps of before they had ids have 0.
   const std::uint64_t id = map.saved().view.map_id;
@@ -111,23 +110,22 @@ std::unique_ptr<const EarlierMap> other_map(const MergeArguments& arguments,
 }
 
 /// "B.stillmap (monday, tuesday)".
-std::string source_of(const std::string& file) {
+std::string source_of(const EarlierMap& map) {
   std::string names;
-  for (const MapSession& session : read_map_sessions(file)) {
+  for (const MapSession& session : map.sessions()) {
     if (!session.source.empty()) names += (names.empty() ? "" : ", ") + session.source;
   }
-  return file + (names.empty() ? "" : " (" + names + ")");
+  return map.file().string() + (names.empty() ? "" : " (" + names + ")");
 }
 
-void save_merged(const MergeArguments& arguments, const EarlierMap& map, const SavedMap& merged,
-                 std::int64_t clock_offset_ns, std::size_t closures) {
+void save_merged(const MergeArguments& arguments, const EarlierMap& map, const EarlierMap& other,
+                 const SavedMap& merged, std::int64_t clock_offset_ns, std::size_t closures) {
   try {
     const FreshMapFile fresh(arguments.out);
     map.copy_to(fresh.path());
-    add_map_session(fresh.path(), merged,
-                    {.source = source_of(arguments.other),
-                     .clock_offset_ns = clock_offset_ns,
-                     .closures = closures});
+    add_map_session(
+        fresh.path(), merged,
+        {.source = source_of(other), .clock_offset_ns = clock_offset_ns, .closures = closures});
     replace_map_file(fresh.path(), arguments.out);
   } catch (const MapFileWriteError& error) {
     throw MapFileWriteError(arguments.out, std::string("cannot be written (") + error.what() + ")");
@@ -159,7 +157,7 @@ ExitCode run(const MergeArguments& arguments) {
       merged_map(map.saved(), other->saved(), alignment.T_map_lidar, clock_offset_ns, rule);
   merged.view.map_id = new_map_id();
   merged.metadata = map.saved().metadata;
-  save_merged(arguments, map, merged, clock_offset_ns, alignment.closures.size());
+  save_merged(arguments, map, *other, merged, clock_offset_ns, alignment.closures.size());
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   if (arguments.json) {

@@ -39,6 +39,14 @@ std::int64_t EarlierMap::clock_offset_ns(std::int64_t first_stamp_ns) const {
   return first_stamp_ns > last_ns ? 0 : last_ns + between_sessions_ns - first_stamp_ns;
 }
 
+std::vector<MapSession> EarlierMap::sessions() const {
+  try {
+    return read_map_sessions(copy_.path());
+  } catch (const MapFileError& error) {
+    throw error_of(file_, copy_.path(), error);
+  }
+}
+
 void EarlierMap::copy_to(const std::filesystem::path& file) const {
   open_map_file(copy_.path())->copy_to(file);
 }

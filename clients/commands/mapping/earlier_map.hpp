@@ -5,10 +5,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/localization/place_index.hpp"
 #include "core/map/static_map.hpp"
 #include "core/map/storage/map_file_copy.hpp"
+#include "core/map/storage/map_sessions.hpp"
 #include "core/session/map_alignment.hpp"
 
 namespace stillmap::cli {
@@ -28,6 +30,8 @@ class EarlierMap {
   [[nodiscard]] std::string identity() const;
   /// What must be added to the stamps of a drive that begins with this one, so that times ascend.
   [[nodiscard]] std::int64_t clock_offset_ns(std::int64_t first_stamp_ns) const;
+  /// Of the path in `saved`, whatever the file holds by now. Throws MapFileError.
+  [[nodiscard]] std::vector<MapSession> sessions() const;
   /// Throws MapFileError.
   void copy_to(const std::filesystem::path& file) const;
 
