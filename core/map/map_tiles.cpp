@@ -186,7 +186,9 @@ std::shared_ptr<const MapSnapshot> MapTiles::view(const VisibilityRule& rule) {
   }
   if (edits_.empty()) return current_;
 
-  const bool has_changed = std::ranges::find(changed, 1) != changed.end();
+  const bool has_changed =
+      std::ranges::find(changed, 1) != changed.end() ||
+      std::ranges::any_of(edits_, [](const auto& edit) { return edit.second == nullptr; });
   std::vector<TileTable::Edit> edits;
   edits.reserve(edits_.size());
   for (auto& [id, tile] : edits_) edits.push_back({id, std::move(tile)});
@@ -305,6 +307,22 @@ std::vector<LiveTile*> MapTiles::to_store(CheckpointScope scope) const {
     if (scope == CheckpointScope::changed || live->view_has_changed()) wanted.push_back(live);
   }
   return wanted;
+}
+
+std::size_t MapTiles::forget_stored(std::span<const TileId> kept) {
+  std::set<TileId> gone = hidden_non_resident_;
+  for (const auto& tile : current_->tiles) gone.insert(tile->info.id);
+  for (const auto& [id, tile] : edits_) gone.insert(id);
+  std::erase_if(gone, [this](TileId id) { return !is_known_non_resident(id); });
+  for (const TileId id : kept) gone.erase(id);
+  for (const TileId id : gone) {
+    if (shown(id) != nullptr) edits_[id] = nullptr;
+    hidden_non_resident_.erase(id);
+    unreadable_.erase(id);
+    --non_resident_count_;
+  }
+  for (const auto& [id, resident] : residents_) unsaved_.insert(id);
+  return gone.size();
 }
 
 void MapTiles::stored(TileId id, std::uint64_t step) {

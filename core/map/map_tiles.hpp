@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -106,6 +107,9 @@ class MapTiles {
   [[nodiscard]] MemoryUse memory_use() const;
 
   [[nodiscard]] std::vector<LiveTile*> to_store(CheckpointScope scope) const;
+  /// Nothing is in the tile store any more: the tiles of it alone are gone, but for these, and what
+  /// is in memory is to be stored. Returns how many are gone.
+  std::size_t forget_stored(std::span<const TileId> kept);
   /// The tile is stored as it was at the end of this step.
   void stored(TileId id, std::uint64_t step);
 

@@ -362,6 +362,8 @@ void StaticMap::checkpoint_stored(std::uint64_t step) {
   for (const TileId id : std::exchange(state_->in_checkpoint, {})) state_->tiles.stored(id, step);
 }
 
+std::size_t StaticMap::forget_lost() { return state_->tiles.forget_stored(state_->in_checkpoint); }
+
 MemoryUse StaticMap::memory_use() const { return state_->tiles.memory_use(); }
 
 std::size_t StaticMap::evict(const Eigen::Vector3d& position_map, std::size_t limit_bytes) {

@@ -171,6 +171,10 @@ class StaticMap {
   [[nodiscard]] MapCheckpoint checkpoint(CheckpointScope scope = CheckpointScope::changed);
   /// To be called when the checkpoint of this step, the last one taken, is in the tile store.
   void checkpoint_stored(std::uint64_t step);
+  /// To be called before that where the tile store lost what it had: tiles that were evicted before
+  /// the last checkpoint was taken are gone, as those that show nothing any more, and the others
+  /// stay in memory until it is stored. It must be one of everything. Returns how many are gone.
+  std::size_t forget_lost();
   /// Evicts tiles that are stored and out of the reach of the lidar, farthest first, until the map
   /// takes no more than this. Returns how many. They are reloaded when they are needed.
   std::size_t evict(const Eigen::Vector3d& position_map, std::size_t limit_bytes);

@@ -158,6 +158,7 @@ void MapSaver::leave_out_lost_tiles(SavedMap& map) {
       spdlog::error("{} tiles of the running map were in the overwritten file alone, and are lost",
                     lost_tiles_.size());
     }
+    source_->forget_lost_tiles();
   }
   std::vector<TileTable::Edit> edits;
   for (const TileId id : lost_tiles_) {

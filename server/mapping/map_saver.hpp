@@ -41,6 +41,9 @@ class CheckpointSource {
   /// It is not: what changed since the last one is in memory alone.
   virtual void checkpoint_failed() = 0;
   [[nodiscard]] virtual MemoryUse memory_use() = 0;
+  /// Evicted tiles that are not in the last checkpoint, which is of everything and not stored yet,
+  /// are lost: the map goes on without them. Nothing to do where none are evicted.
+  virtual void forget_lost_tiles() {}
 };
 
 /// The map that a reset began.

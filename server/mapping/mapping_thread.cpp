@@ -312,6 +312,15 @@ MemoryUse MappingThread::memory_use() {
   return use;
 }
 
+void MappingThread::forget_lost_tiles() {
+  requests_.run([&] {
+    StaticMap& map = mapper_.static_map();
+    map.forget_lost();
+    publish_snapshot();
+    statistics_.set_map_memory(map.memory_use(), map.unreadable_tiles().size());
+  });
+}
+
 void MappingThread::end_round(bool is_idle) {
   if (!take_corrected(is_idle)) return;
   if (octree_is_behind_ && mapper_.confirmed_scans() == 0) {

@@ -55,6 +55,10 @@ class DisplacedMapFile : public testing::Test, public CheckpointSource {
   }
   void checkpoint_stored(std::uint64_t step) override { map_.checkpoint_stored(step); }
   void checkpoint_failed() override { ++failed_; }
+  void forget_lost_tiles() override {
+    map_.forget_lost();
+    latest_map_.publish(map_.view());
+  }
   [[nodiscard]] MemoryUse memory_use() override { return {}; }
 
   void begin(std::uint64_t map_id, const std::shared_ptr<TileStore>& tiles) {
@@ -397,6 +401,35 @@ TEST_F(DisplacedMapFile, OtherConnectionsOfStillmapAreNoStrangers) {
   map_scan(50.0F);
   EXPECT_EQ(saver_.save_as(""), file_);
   EXPECT_EQ(displaced(), 0U);
+}
+
+TEST_F(DisplacedMapFile, TilesThatAreLostAreNotServedAnyMore) {
+  const std::uint64_t version = map_.view()->version;
+  const fs::path saved = saved_after_damage();
+  const auto view = latest_map_.view();
+  ASSERT_EQ(view->tiles.size(), 1U) << "two were in the file alone";
+  EXPECT_EQ(view->tiles.front()->info.id.x, 2);
+  EXPECT_GT(view->version, version);
+  EXPECT_EQ(map_.memory_use().non_resident_tiles, 0U);
+  const auto history = latest_map_.state().history;
+  EXPECT_EQ(history->removed.size(), 2U) << "clients that ask for changes are told";
+  // What is mapped there anew is a tile as any other.
+  map_scan(5.0F);
+  EXPECT_EQ(latest_map_.view()->tiles.size(), 2U);
+  EXPECT_TRUE(map_.unreadable_tiles().empty());
+  saver_.save_as("");
+  EXPECT_THAT(tiles_in(saved), testing::ElementsAre(0, 2));
+}
+
+TEST_F(DisplacedMapFile, WhatIsInMemoryAloneIsNotEvictedUntilItIsStored) {
+  map_scan(30.0F);
+  saver_.save_if_changed();
+  evict_all();
+  map_scan(5.0F);
+  static_cast<void>(map_.checkpoint(CheckpointScope::everything));
+  EXPECT_EQ(map_.forget_lost(), 1U);
+  evict_all();
+  EXPECT_EQ(map_.memory_use().resident_tiles, 1U);
 }
 
 }  // namespace
