@@ -67,6 +67,18 @@ TEST_F(MapToolsTest, AClockThatWasSetBackIsSaidAndIsNoSession) {
   EXPECT_THAT(run("sessions " + path("back.stillmap")).out,
               HasSubstr("the clock of session 1 was set back"));
   EXPECT_THAT(run("map-check " + path("back.stillmap")).out, HasSubstr("2 poses of 1 session\n"));
+  // Later than where it began by the end.
+  saved.trajectory = {StampedPose{.stamp_ns = 1'000'000'000},
+                      {.stamp_ns = 3'000'000'000},
+                      {.stamp_ns = 2'000'000'000},
+                      {.stamp_ns = 9'000'000'000},
+                      {.stamp_ns = 8'000'000'000}};
+  open_map_file(path("later.stillmap"))->save(saved);
+  EXPECT_THAT(run("sessions " + path("later.stillmap")).out,
+              HasSubstr("the clock of session 1 was set back while it was mapped, 2 times"));
+  const nlohmann::json sessions =
+      nlohmann::json::parse(run("sessions --json " + path("later.stillmap")).out);
+  EXPECT_EQ(sessions.at(0).at("steps_back"), 2);
 }
 
 TEST_F(MapToolsTest, CheckTellsSoundFromDamagedByItsExitCode) {

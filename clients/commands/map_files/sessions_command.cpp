@@ -34,7 +34,8 @@ Json sessions_json(const std::vector<MapSession>& sessions) {
                     {"first_stamp_ns", session.first_stamp_ns},
                     {"last_stamp_ns", session.last_stamp_ns},
                     {"clock_offset_ns", session.clock_offset_ns},
-                    {"closures", session.closures}});
+                    {"closures", session.closures},
+                    {"steps_back", session.steps_back}});
   }
   return list;
 }
@@ -53,9 +54,11 @@ std::string sessions_table(const std::vector<MapSession>& sessions) {
   }
   std::string text = table.text();
   for (const MapSession& session : sessions) {
-    if (session.last_stamp_ns >= session.first_stamp_ns) continue;
+    if (session.steps_back == 0) continue;
     text += "the clock of session " + std::to_string(session.number) +
-            " was set back while it was mapped: its last pose has the earlier stamp\n";
+            " was set back while it was mapped, " +
+            (session.steps_back == 1 ? "once" : std::to_string(session.steps_back) + " times") +
+            ": a pose has an earlier stamp than the one before it\n";
   }
   return text;
 }

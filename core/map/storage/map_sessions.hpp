@@ -28,6 +28,8 @@ struct MapSession {
   std::int64_t clock_offset_ns = 0;
   /// Places that put it on the map as it was before; 0 for the first session.
   std::size_t closures = 0;
+  /// How often a pose has an earlier stamp than the one before it.
+  std::size_t steps_back = 0;
 };
 
 /// The sessions of a map in their order; one of a map that was made in one run, none of an empty

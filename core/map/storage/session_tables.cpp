@@ -46,6 +46,15 @@ double way_between_m(const SharedTrajectory& path, std::size_t first, std::size_
   return way;
 }
 
+std::size_t steps_back_in(const SharedTrajectory& path, const MapSession& session) {
+  std::size_t steps = 0;
+  for (std::size_t i = 1; i < session.poses; ++i) {
+    const std::size_t pose = session.first_pose + i;
+    if (path[pose].stamp_ns < path[pose - 1].stamp_ns) ++steps;
+  }
+  return steps;
+}
+
 /// Whether the path still has the session's poses; what was restored before the first scan has
 /// none.
 bool is_in(const SharedTrajectory& path, const MapSession& session) {
@@ -150,6 +159,7 @@ std::vector<MapSession> read_sessions(SQLite::Database& database, const SharedTr
       sessions.insert(sessions.begin(), first);
     }
   }
+  for (MapSession& session : sessions) session.steps_back = steps_back_in(path, session);
   return sessions;
 }
 
