@@ -6,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/lidar/measured_elevation.hpp"
 #include "core/lidar/prepare.hpp"
 #include "core/lidar/rings.hpp"
 #include "core/lidar/sensor_model.hpp"
@@ -82,8 +83,8 @@ std::optional<std::vector<double>> ring_elevations(const Scan& scan,
   if (rings.empty()) return std::nullopt;
   std::vector<std::vector<double>> of_ring(beam_unevenness_deg.size());
   for (std::size_t i = 0; i < scan.size(); ++i) {
-    const Eigen::Vector3f& p = scan.points_lidar[i];
-    of_ring.at(rings[i]).push_back(std::atan2(static_cast<double>(p.z()), distance(p)));
+    const double elevation = measured_elevation(scan.points_lidar[i]);
+    if (std::isfinite(elevation)) of_ring.at(rings[i]).push_back(elevation);
   }
   std::vector<double> elevations;
   for (std::vector<double>& values : of_ring) {
@@ -142,7 +143,8 @@ std::optional<AzimuthSteps> azimuth_steps(const Scan& scan) {
     const double azimuth_b = azimuth(b);
     const double step = std::remainder(azimuth_b - azimuth(a), 2.0 * std::numbers::pi);
     const double nearer_per_m = 1.0 / distance(b) - 1.0 / distance(a);
-    if (!std::isfinite(nearer_per_m) || std::abs(step) > max_step) continue;
+    if (!a.allFinite() || !b.allFinite() || !std::isfinite(nearer_per_m)) continue;
+    if (std::abs(step) > max_step) continue;
     if (std::abs(nearer_per_m) < max_smooth_per_m) smooth.push_back(step);
     const double sideways = azimuth_b * std::sin(azimuth_b) / (2.0 * std::numbers::pi);
     if (std::abs(nearer_per_m) > min_jump_per_m) jumps.push_back({step, nearer_per_m * sideways});

@@ -15,6 +15,7 @@
 #include "core/dataset/imu_file.hpp"
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/point_cloud_files.hpp"
+#include "core/lidar/measured_elevation.hpp"
 #include "core/lidar/point_fields.hpp"
 #include "core/lidar/ring_numbering.hpp"
 #include "core/lidar/sensor_fit.hpp"
@@ -144,7 +145,7 @@ std::vector<std::int64_t> stamps_from_names(const std::vector<fs::path>& files) 
 std::pair<double, double> field_of_view(const Scan& scan) {
   double low = 0.0, high = 0.0;
   for (const auto& p : scan.points_lidar) {
-    const double elevation = std::atan2(p.z(), std::hypot(p.x(), p.y()));
+    const double elevation = measured_elevation(p);
     if (!std::isfinite(elevation)) continue;
     low = std::min(low, elevation);
     high = std::max(high, elevation);

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <numeric>
 
+#include "core/lidar/measured_elevation.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -63,11 +65,9 @@ RingNumbering one_after_another(const std::vector<bool>& stands) {
 std::vector<double> elevations_by_number(const Scan& scan, std::size_t numbers) {
   std::vector<double> sums(numbers, 0.0), points(numbers, 0.0);
   for (std::size_t i = 0; i < scan.size(); ++i) {
-    const Eigen::Vector3f& p = scan.points_lidar[i];
-    const float across = std::hypot(p.x(), p.y());
-    // Drivers put points that were not measured at the origin.
-    if (!(across > 0.1F) || !std::isfinite(across) || !std::isfinite(p.z())) continue;
-    sums[scan.ring[i]] += static_cast<double>(std::atan2(p.z(), across));
+    const double elevation = measured_elevation(scan.points_lidar[i]);
+    if (!std::isfinite(elevation)) continue;
+    sums[scan.ring[i]] += elevation;
     points[scan.ring[i]] += 1.0;
   }
   for (std::size_t number = 0; number < numbers; ++number) sums[number] /= points[number];

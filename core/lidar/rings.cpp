@@ -27,8 +27,11 @@ float diamond_angle(const Eigen::Vector3f& p) {
   return p.y() >= 0.0F ? 1.0F - side : 3.0F + side;
 }
 
-/// Tangent of the elevation.
-float slope(const Eigen::Vector3f& p) { return p.z() / std::sqrt(p.x() * p.x() + p.y() * p.y()); }
+/// Tangent of the elevation; NAN of points that are not finite.
+float slope(const Eigen::Vector3f& p) {
+  if (!p.allFinite()) return std::numeric_limits<float>::quiet_NaN();
+  return p.z() / std::sqrt(p.x() * p.x() + p.y() * p.y());
+}
 
 template <class T, class Function>
 std::vector<T> of_each_point(const Scan& scan, Function function) {

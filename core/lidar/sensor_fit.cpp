@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/lidar/measured_elevation.hpp"
 #include "core/lidar/ring_numbering.hpp"
 
 namespace stillmap {
@@ -29,13 +30,6 @@ constexpr int bands = 40;
 constexpr double margin = 1.0 * degree;
 constexpr std::size_t max_samples = 8192;
 
-double elevation_of(const Eigen::Vector3f& p) {
-  const double across = std::hypot(static_cast<double>(p.x()), static_cast<double>(p.y()));
-  const double elevation = std::atan2(static_cast<double>(p.z()), across);
-  // Drivers put points that were not measured at the origin.
-  return p.squaredNorm() > 0.01F ? elevation : NAN;
-}
-
 double median_of(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::ranges::nth_element(values, middle);
@@ -50,7 +44,7 @@ std::vector<double> ring_elevations(const Scan& scan) {
   if (numbering.rings > max_rings) return {};
   std::vector<std::vector<double>> of_ring(static_cast<std::size_t>(numbering.rings));
   for (std::size_t i = 0; i < scan.size(); ++i) {
-    const double elevation = elevation_of(scan.points_lidar[i]);
+    const double elevation = measured_elevation(scan.points_lidar[i]);
     if (std::isfinite(elevation))
       of_ring[numbering.ring_of_number[scan.ring[i]]].push_back(elevation);
   }
@@ -161,7 +155,7 @@ std::vector<Cluster> elevation_clusters(const Scan& scan, double& points) {
   std::vector<Cluster> histogram(2 * bins_half + 1);
   points = 0.0;
   for (const Eigen::Vector3f& p : scan.points_lidar) {
-    const double elevation = elevation_of(p);
+    const double elevation = measured_elevation(p);
     if (!std::isfinite(elevation) || p.squaredNorm() < min_range_m * min_range_m) continue;
     Cluster& at = histogram[static_cast<std::size_t>(std::lround(elevation / bin) + bins_half)];
     at.points += 1.0;
@@ -217,7 +211,7 @@ std::vector<double> sorted_elevations(const Scan& scan) {
   std::vector<double> elevations;
   const std::size_t step = scan.size() / max_samples + 1;
   for (std::size_t i = 0; i < scan.size(); i += step) {
-    const double elevation = elevation_of(scan.points_lidar[i]);
+    const double elevation = measured_elevation(scan.points_lidar[i]);
     if (std::isfinite(elevation)) elevations.push_back(elevation);
   }
   std::ranges::sort(elevations);

@@ -406,5 +406,19 @@ TEST(ScanDataset, NamesTheScanAndTheLineThatATextFileLacks) {
       AllOf(HasSubstr("times.txt"), HasSubstr("12 lines"), HasSubstr("scan 000028 needs line 29")));
 }
 
+TEST(ScanDataset, TakesNoPointAtInfinityForOneOfTheFieldOfView) {
+  const ScratchFolder folder;
+  Scan few = ringed_scan(vlp_16(), 0, 0);
+  few.points_lidar.resize(800);
+  few.points_lidar.insert(few.points_lidar.end(), 100, {INFINITY, -INFINITY, INFINITY});
+  few.intensity.assign(few.size(), 0.5F);
+  for (const char* name : {"velodyne", "time_offsets"})
+    std::filesystem::create_directories(folder.path() / name);
+  write_kitti_bin(folder.path() / "velodyne/000000.bin", few);
+  write_values<float>(folder.path() / "time_offsets/000000.bin",
+                      std::vector<float>(few.size(), 0.01F));
+  EXPECT_EQ(ScanDataset(folder.path()).suggested_sensor().name, "VLP-16");
+}
+
 }  // namespace
 }  // namespace stillmap

@@ -239,6 +239,7 @@ TEST(AssignRings, IsSafeOnBadPoints) {
     const auto rings = assign_rings(scan, sensor);
     ASSERT_EQ(rings.size(), scan.size());
     for (const std::uint16_t ring : rings) EXPECT_LT(ring, sensor.rings);
+    EXPECT_EQ(rings[1], 0);
     EXPECT_EQ(rings[3], 0);
     EXPECT_EQ(rings[4], sensor.rings - 1);
   }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <random>
 
@@ -272,6 +273,24 @@ TEST(SensorMismatch, NamesWhatDoesNotFit) {
   EXPECT_THAT(sensor_mismatch(scan_of(wide, false), hdl_64e()), HasSubstr("between -4"));
   EXPECT_THAT(sensor_mismatch(scan_of(hdl_64e(), true), hdl_64e()), IsEmpty());
   EXPECT_THAT(sensor_mismatch({}, hdl_64e()), IsEmpty());
+}
+
+TEST(FitSensor, TakesNoPointAtInfinityForMeasured) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  for (const bool with_rings : {true, false}) {
+    for (const SensorModel& sensor : {vlp_16(), hdl_32e(), hdl_64e()}) {
+      Scan scan = scan_of(sensor, with_rings);
+      // What the upper half of the beams did not hit, as Gazebo and REP 117 write it.
+      for (int ring = 0; ring < sensor.rings / 2; ++ring) {
+        for (int column = 0; column < 400; ++column) {
+          add_point(sensor.beam_elevation(ring), 0.0157 * column + 0.005, infinity, scan);
+          if (with_rings) scan.ring.push_back(static_cast<std::uint16_t>(sensor.rings - 1 - ring));
+        }
+      }
+      EXPECT_EQ(fit_sensor(scan)->name, sensor.name) << with_rings;
+      EXPECT_THAT(sensor_mismatch(scan, sensor), IsEmpty()) << with_rings;
+    }
+  }
 }
 
 }  // namespace
