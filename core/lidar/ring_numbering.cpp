@@ -74,27 +74,56 @@ std::vector<double> elevations_by_number(const Scan& scan, std::size_t numbers) 
   return sums;
 }
 
-/// How far the rings lie from the beams that their numbers, less `first`, mean [rad], by whichever
+/// A way to count: every `step`-th number is a ring, the first `first`.
+struct Counting {
+  std::size_t step = 1;
+  std::size_t first = 0;
+};
+
+/// The ways by which no number means a ring beyond the sensor's, the most usual first.
+std::vector<Counting> possible_countings(const std::vector<bool>& stands, std::size_t rings) {
+  std::vector<std::size_t> steps = {1};
+  if (step_of(stands) > 1) steps.push_back(step_of(stands));
+  std::vector<Counting> possible;
+  for (const std::size_t step : steps) {
+    const std::size_t lowest = lowest_of(stands) / step, highest = (stands.size() - 1) / step;
+    if (highest < rings) possible.push_back({step, 0});
+    // A lower ring may have seen nothing: it counts from one only where all rings are needed.
+    const bool is_from_one = lowest == 1 || (lowest > 1 && highest == rings);
+    if (is_from_one && highest <= rings) possible.push_back({step, 1});
+  }
+  return possible;
+}
+
+/// How far the rings lie from the beams that they are by this counting, summed [rad], by whichever
 /// end the field counts from.
 double distance_from_beams(const std::vector<double>& elevations, const SensorModel& sensor,
-                           std::size_t first) {
+                           const Counting& counting) {
   double from_top = 0.0, from_bottom = 0.0;
-  for (std::size_t number = first; number < elevations.size(); ++number) {
+  for (std::size_t number = 0; number < elevations.size(); ++number) {
     if (!std::isfinite(elevations[number])) continue;
-    const auto ring = static_cast<int>(number - first);
+    const auto ring = static_cast<int>(number / counting.step - counting.first);
     from_top += std::abs(elevations[number] - sensor.beam_elevation(ring));
     from_bottom += std::abs(elevations[number] - sensor.beam_elevation(sensor.rings - 1 - ring));
   }
   return std::min(from_top, from_bottom);
 }
 
-/// Whether a field whose lowest number is 1, and whose highest is below the sensor's rings, lacks
-/// its highest ring rather than its lowest. The beams must say so clearly: those of data sheets
+/// The most usual counting, unless the beams say clearly that it is another: those of data sheets
 /// are a little beside the real ones.
-bool counts_from_one(const Scan& scan, const SensorModel& sensor, std::size_t numbers) {
+Counting told_by_beams(const std::vector<Counting>& possible, const Scan& scan,
+                       const SensorModel& sensor, std::size_t numbers) {
+  Counting told = possible.front();
+  if (possible.size() == 1 || scan.ring.size() != scan.size()) return told;
   const std::vector<double> elevations = elevations_by_number(scan, numbers);
-  return 3.0 * distance_from_beams(elevations, sensor, 1) <
-         distance_from_beams(elevations, sensor, 0);
+  double distance = distance_from_beams(elevations, sensor, told);
+  for (const Counting& other : possible) {
+    const double others = distance_from_beams(elevations, sensor, other);
+    if (3.0 * others >= distance) continue;
+    told = other;
+    distance = others;
+  }
+  return told;
 }
 
 }  // namespace
@@ -110,17 +139,10 @@ RingNumbering ring_numbering(const Scan& scan) {
 std::optional<RingNumbering> ring_numbering(const Scan& scan, const SensorModel& sensor) {
   if (scan.ring.empty()) return std::nullopt;
   const std::vector<bool> stands = standing_numbers(scan);
-  const auto rings = static_cast<std::size_t>(sensor.rings);
-  const std::size_t lowest = lowest_of(stands);
-  if (stands.size() <= rings) {
-    const bool is_from_one = lowest == 1 && scan.ring.size() == scan.size() &&
-                             counts_from_one(scan, sensor, stands.size());
-    return evenly(stands, 1, is_from_one ? 1 : 0);
-  }
-  for (const std::size_t step : {std::size_t{1}, step_of(stands)}) {
-    const std::size_t highest = (stands.size() - 1) / step;
-    if (highest < rings) return evenly(stands, step, 0);
-    if (highest == rings && lowest / step >= 1) return evenly(stands, step, 1);
+  const auto possible = possible_countings(stands, static_cast<std::size_t>(sensor.rings));
+  if (!possible.empty()) {
+    const auto [step, first] = told_by_beams(possible, scan, sensor, stands.size());
+    return evenly(stands, step, first);
   }
   RingNumbering numbering = one_after_another(stands);
   if (skips(stands) && numbering.rings == sensor.rings) return numbering;

@@ -27,7 +27,8 @@ struct RingNumbering {
 /// and 0 does not, the field counts from 1.
 [[nodiscard]] RingNumbering ring_numbering(const Scan& scan);
 
-/// As numbers of this sensor's rings; nothing where they cannot be.
+/// As numbers of this sensor's rings; nothing where they cannot be. Where they can be in more ways
+/// than one, as when half of the rings saw nothing, its beams' elevations tell.
 [[nodiscard]] std::optional<RingNumbering> ring_numbering(const Scan& scan,
                                                           const SensorModel& sensor);
 

@@ -252,5 +252,29 @@ TEST(AssignRings, GivesOneRingToPointsThatAreAllEqual) {
   EXPECT_THAT(rings, testing::Each(rings.front()));
 }
 
+TEST(AssignRings, TakesAFieldThatSkipsNumbersThoughHalfOfTheRingsSawNothing) {
+  const std::ptrdiff_t one_ring = 720;
+  for (const bool from_top : {true, false}) {
+    for (const auto& [step, first] : {std::pair{2, 0}, {2, 1}, {2, 2}, {4, 3}}) {
+      for (const int seen : {2, 7, 8, 9}) {
+        for (const bool sees_top : {true, false}) {
+          RingedScan ringed = blurred(vlp_16());
+          ringed.scan.ring = numbered(ringed.truth, from_top, step, first);
+          const auto cut = [&](auto& values) {
+            if (sees_top) values.erase(values.begin() + seen * one_ring, values.end());
+            if (!sees_top) values.erase(values.begin(), values.end() - seen * one_ring);
+          };
+          cut(ringed.scan.points_lidar);
+          cut(ringed.scan.ring);
+          cut(ringed.truth);
+          EXPECT_EQ(assign_rings(ringed.scan, vlp_16()), ringed.truth)
+              << "every " << step << " from " << first << (from_top ? ", from the top, " : ", ")
+              << seen << " rings" << (sees_top ? " of the top" : " of the bottom");
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace stillmap
