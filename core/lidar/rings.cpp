@@ -8,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include "core/lidar/measured_elevation.hpp"
 #include "core/lidar/ring_numbering.hpp"
 
 namespace stillmap {
@@ -137,17 +138,19 @@ bool is_seam(const StepsAtCuts& first, const StepsAtCuts& second) {
 
 /// Whether ring numbers grow downwards: the mean ring of the upper half is the smaller one.
 bool numbered_from_top(const Scan& scan) {
-  double rings = 0.0, slopes = 0.0, products = 0.0;
+  double rings = 0.0, sines = 0.0, products = 0.0;
   double count = 0.0;
   for (std::size_t i = 0; i < scan.size(); ++i) {
-    const double s = slope(scan.points_lidar[i]);
-    if (!std::isfinite(s)) continue;
+    const Eigen::Vector3f& p = scan.points_lidar[i];
+    if (!is_measured(p)) continue;
+    // Of the elevation: the tangent of one point beside the axis would outweigh all others.
+    const double sine = p.z() / p.norm();
     count += 1.0;
     rings += scan.ring[i];
-    slopes += s;
-    products += scan.ring[i] * s;
+    sines += sine;
+    products += scan.ring[i] * sine;
   }
-  return products * count <= rings * slopes;
+  return products * count <= rings * sines;
 }
 
 std::vector<std::uint16_t> rings_from_field(const Scan& scan, const SensorModel& sensor,

@@ -276,5 +276,21 @@ TEST(AssignRings, TakesAFieldThatSkipsNumbersThoughHalfOfTheRingsSawNothing) {
   }
 }
 
+TEST(AssignRings, KeepsTheEndThatAFieldCountsFromBesideAPointOnTheAxis) {
+  for (const bool from_top : {true, false}) {
+    for (const float height_m : {3.0F, -3.0F, -0.02F}) {
+      RingedScan ringed = blurred(vlp_16());
+      ringed.scan.ring = numbered(ringed.truth, from_top, 1, 0);
+      for (const int ring : {0, 15}) {
+        ringed.scan.points_lidar.emplace_back(1e-6F, 0.0F, height_m);
+        ringed.scan.ring.push_back(static_cast<std::uint16_t>(ring));
+        ringed.truth.push_back(static_cast<std::uint16_t>(from_top ? ring : 15 - ring));
+        EXPECT_EQ(assign_rings(ringed.scan, vlp_16()), ringed.truth)
+            << height_m << " m above, ring " << ring << (from_top ? ", from the top" : "");
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace stillmap
