@@ -36,9 +36,9 @@ double median_of(std::vector<double>& values) {
   return *middle;
 }
 
-/// Median elevation of every ring, NAN for rings with too few points, in the field's own order.
-/// Empty for a field of more rings than a sensor can have, which is something else.
-std::vector<double> ring_elevations(const Scan& scan) {
+/// Elevations of the measured points of every ring, in the field's own order. Empty for a field of
+/// more rings than a sensor can have, which is something else.
+std::vector<std::vector<double>> elevations_by_ring(const Scan& scan) {
   constexpr int max_rings = 256;
   const RingNumbering numbering = ring_numbering(scan);
   if (numbering.rings > max_rings) return {};
@@ -48,11 +48,25 @@ std::vector<double> ring_elevations(const Scan& scan) {
     if (std::isfinite(elevation))
       of_ring[numbering.ring_of_number[scan.ring[i]]].push_back(elevation);
   }
-  std::vector<double> elevations;
-  for (auto& values : of_ring) {
-    elevations.push_back(values.size() < min_points_on_ring ? NAN : median_of(values));
+  return of_ring;
+}
+
+/// Whether half of the points lie far from the middles of their rings: the field then names no
+/// rings about this frame's axis, as that of several lidars that lean, each in its way. Motion
+/// within a scan, taken out or not, moves most points by less than a few degrees.
+bool are_scattered(const std::vector<std::vector<double>>& of_ring,
+                   const std::vector<double>& medians) {
+  constexpr double max_distance = 3.0 * degree;
+  const auto [low, high] = std::ranges::minmax(medians);
+  const double step = (high - low) / static_cast<double>(medians.size() - 1);
+  std::size_t points = 0, far = 0;
+  for (std::size_t ring = 0; ring < of_ring.size(); ++ring) {
+    points += of_ring[ring].size();
+    far += static_cast<std::size_t>(std::ranges::count_if(of_ring[ring], [&](double elevation) {
+      return std::abs(elevation - medians[ring]) > std::max(step, max_distance);
+    }));
   }
-  return elevations;
+  return 2 * far > points;
 }
 
 /// Interpolates or extrapolates the elevations of rings without points; false with fewer than two.
@@ -128,8 +142,12 @@ std::optional<SensorModel> fit_beams(std::vector<double> elevations) {
 }
 
 std::optional<SensorModel> fit_rings(const Scan& scan) {
-  std::vector<double> elevations = ring_elevations(scan);
+  std::vector<std::vector<double>> of_ring = elevations_by_ring(scan);
+  std::vector<double> elevations;
+  for (std::vector<double>& values : of_ring)
+    elevations.push_back(values.size() < min_points_on_ring ? NAN : median_of(values));
   if (elevations.size() < 4 || !complete(elevations)) return std::nullopt;
+  if (are_scattered(of_ring, elevations)) return std::nullopt;
   std::ranges::sort(elevations, std::greater<>{});
   return fit_beams(std::move(elevations));
 }
@@ -262,8 +280,9 @@ std::optional<SensorModel> fit_sensor(const Scan& scan) {
 
 std::string sensor_mismatch(const Scan& scan, const SensorModel& sensor) {
   const RingNumbering numbering = ring_numbering(scan);
-  // The same number in all points tells nothing.
-  if (numbering.numbers > 1 && numbering.rings > sensor.rings && !ring_numbering(scan, sensor)) {
+  // The same number in all points tells nothing, nor does a field beside a sensor without rings.
+  if (sensor.pattern == ScanPattern::rings && numbering.numbers > 1 &&
+      numbering.rings > sensor.rings && !ring_numbering(scan, sensor)) {
     return "the cloud's ring field reaches " + std::to_string(numbering.highest_number()) + " (" +
            std::to_string(numbering.numbers) + " rings), but sensor " + sensor.name + " has only " +
            std::to_string(sensor.rings) + " rings";

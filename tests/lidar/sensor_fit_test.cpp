@@ -293,5 +293,64 @@ TEST(FitSensor, TakesNoPointAtInfinityForMeasured) {
   }
 }
 
+/// Turned about y, as by a lidar's pitch.
+Scan pitched(Scan scan, double angle) {
+  const Eigen::Matrix3f R =
+      Eigen::AngleAxisf(static_cast<float>(angle), Eigen::Vector3f::UnitY()).toRotationMatrix();
+  for (Eigen::Vector3f& p : scan.points_lidar) p = R * p;
+  return scan;
+}
+
+/// Two lidars in one cloud, one of which leans forwards and the other backwards.
+Scan leaning_pair(const SensorModel& sensor, double angle) {
+  Scan scan = pitched(scan_of(sensor, true), angle);
+  const Scan other = pitched(scan_of(sensor, true), -angle);
+  scan.points_lidar.insert(scan.points_lidar.end(), other.points_lidar.begin(),
+                           other.points_lidar.end());
+  scan.ring.insert(scan.ring.end(), other.ring.begin(), other.ring.end());
+  return scan;
+}
+
+TEST(FitSensor, LeavesOutARingFieldThatNamesNoRings) {
+  SensorModel wide;
+  wide.rings = 128;
+  wide.fov_up = 45.0 * degree;
+  wide.fov_down = -45.0 * degree;
+  for (const SensorModel& sensor : {vlp_16(), hdl_32e(), wide}) {
+    for (const double angle : {8.0, 20.0, 45.0}) {
+      const Scan scan = leaning_pair(sensor, angle * degree);
+      const auto fitted = fit_sensor(scan);
+      ASSERT_TRUE(fitted);
+      EXPECT_EQ(fitted->pattern, ScanPattern::irregular) << sensor.name << " by " << angle;
+      EXPECT_THAT(sensor_mismatch(scan, *fitted), IsEmpty());
+      EXPECT_GT(fitted->fov_up, sensor.beam_elevation(0));
+    }
+  }
+  // Numbers by azimuth, and by nothing.
+  Scan scan = scan_of(hdl_32e(), true);
+  std::mt19937 random(6);
+  for (std::size_t i = 0; i < scan.size(); ++i) scan.ring[i] = static_cast<std::uint16_t>(i % 200);
+  EXPECT_EQ(fit_sensor(scan)->name, "HDL-32E");
+  for (std::uint16_t& ring : scan.ring) ring = static_cast<std::uint16_t>(random() % 64);
+  EXPECT_EQ(fit_sensor(scan)->name, "HDL-32E");
+}
+
+TEST(FitSensor, BelievesTheRingsOfACompensatedScan) {
+  // To the end of a sweep: 3 m on, as of a car on a motorway, or 10 degrees down, of a hand.
+  for (const SensorModel& sensor : {vlp_16(), hdl_32e(), hdl_64e()}) {
+    Scan driven = scan_of(sensor, true), nodded = driven;
+    for (std::size_t i = 0; i < driven.size(); ++i) {
+      const double part = static_cast<double>(i % 200) / 200.0;
+      driven.points_lidar[i].x() -= static_cast<float>(3.0 * part);
+      nodded.points_lidar[i] =
+          Eigen::AngleAxisf(static_cast<float>(10.0 * degree * part), Eigen::Vector3f::UnitY()) *
+          nodded.points_lidar[i];
+    }
+    EXPECT_EQ(fit_sensor(driven)->pattern, ScanPattern::rings) << sensor.name;
+    EXPECT_EQ(fit_sensor(driven)->rings, sensor.rings);
+    EXPECT_EQ(fit_sensor(nodded)->rings, sensor.rings);
+  }
+}
+
 }  // namespace
 }  // namespace stillmap
