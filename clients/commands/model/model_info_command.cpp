@@ -52,7 +52,7 @@ void print_description(const ModelDescription& model) {
   const std::string least = std::to_string(model.min_columns);
   line("image     ", std::to_string(model.rows) + "x" + std::to_string(model.columns) +
                          (model.min_columns > 0 ? ", down to " + least + " columns" : "") +
-                         (model.follow_sensor ? ", rows as the sensor has rings" : ""));
+                         (model.follow_sensor ? ", rows half way to the sensor's rings" : ""));
   line("channels  ", channels_in_words(model.statistics.channels));
   line("outputs   ", std::to_string(model.classes.size()));
   line("votes     ", votes_in_words(model));
