@@ -7,6 +7,8 @@
 #include "config/loaders/model_file.hpp"
 #include "config/loaders/sensor_file.hpp"
 #include "config/loaders/server_config.hpp"
+#include "core/dataset/dataset_error.hpp"
+#include "core/lidar/sensor_fit.hpp"
 
 namespace stillmap::cli {
 
@@ -159,6 +161,29 @@ std::string describe_model(const MapperArguments& arguments, const ScanDataset& 
                    mapper_config(arguments, dataset.suggested_sensor()).sensor);
   if (!better.empty()) text += "stillmap: " + better + "; --labels chooses\n";
   return text;
+}
+
+std::string describe_sensor_mismatch(const ScanDataset& dataset, const SensorModel& sensor) {
+  const std::size_t samples = std::min<std::size_t>(dataset.size(), 5);
+  std::size_t read = 0, misfits = 0;
+  std::string misfit;
+  for (std::size_t k = 0; k < samples; ++k) {
+    try {
+      const Scan scan = dataset.read((2 * k + 1) * dataset.size() / (2 * samples)).scan;
+      ++read;
+      const std::string words = sensor_mismatch(scan, sensor);
+      if (words.empty()) continue;
+      ++misfits;
+      misfit = words;
+    } catch (const DatasetError&) {
+      // Whoever needs that scan is told.
+      continue;
+    }
+  }
+  if (2 * misfits <= read) return {};
+  return "stillmap: " + misfit +
+         ": --sensor names another ('stillmap dataset sensor' makes a sensor file from a "
+         "recording)\n";
 }
 
 }  // namespace stillmap::cli

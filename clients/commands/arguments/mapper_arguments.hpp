@@ -62,5 +62,9 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments);
 /// more like theirs; empty without a network.
 [[nodiscard]] std::string describe_model(const MapperArguments& arguments,
                                          const ScanDataset& dataset, const Segmenter& segmenter);
+/// A line that tells why most of the data set's scans cannot come from this sensor; empty when they
+/// can.
+[[nodiscard]] std::string describe_sensor_mismatch(const ScanDataset& dataset,
+                                                   const SensorModel& sensor);
 
 }  // namespace stillmap::cli

@@ -94,7 +94,8 @@ ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopS
   const std::size_t total = arguments.range.end(dataset) - arguments.range.first;
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
   auto labels = make_segmenter(arguments.mapper, dataset);
-  std::cerr << describe_model(arguments.mapper, dataset, *labels);
+  std::cerr << describe_sensor_mismatch(dataset, config.sensor)
+            << describe_model(arguments.mapper, dataset, *labels);
   // What cannot be read is told before anything is replaced.
   static_cast<void>(dataset.imu());
   static_cast<void>(dataset.gnss());

@@ -114,6 +114,7 @@ class LocalizationRun {
     }
   }
 
+  [[nodiscard]] const SensorModel& sensor() const { return config_.sensor; }
   /// Scans that could not be read.
   [[nodiscard]] std::size_t skipped() const { return skipped_; }
 
@@ -229,6 +230,7 @@ ExitCode run(const LocalizeArguments& arguments) {
   const std::size_t end = arguments.range.end(dataset);
   const Localizer localizer(map.index);
   LocalizationRun run(dataset, arguments, localizer);
+  std::cerr << describe_sensor_mismatch(dataset, run.sensor());
   const auto step = static_cast<std::size_t>(arguments.step);
   Progress progress("localize", "scans", (end - arguments.range.first + step - 1) / step);
   std::vector<LocalizedScan> scans;

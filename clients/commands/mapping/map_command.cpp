@@ -377,7 +377,8 @@ ExitCode run(const MapArguments& arguments) {
   const std::optional<Trajectory> truth = usable_truth(dataset);
   auto labels = make_segmenter(arguments.mapper, dataset, body.T_body_lidar);
   const std::unique_ptr<const EarlierMap> earlier = earlier_map(arguments, config);
-  std::cerr << describe_model(arguments.mapper, dataset, *labels);
+  std::cerr << describe_sensor_mismatch(dataset, config.sensor)
+            << describe_model(arguments.mapper, dataset, *labels);
   // Nothing above touched the folder.
   MapOutputFolder out(arguments.out, arguments.policy);
   const MappingResult result =
