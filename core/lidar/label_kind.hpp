@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "core/lidar/semantic_class.hpp"
 
@@ -14,8 +15,12 @@ enum class LabelKind {
   classes,
 };
 
-/// The class of a label as it is in a field or a file. Numbers that the kind does not have give
-/// `unlabeled`.
+/// Labels from here on are no whole numbers in a float of 32 bits: an id with its instance is
+/// rounded to another id there.
+inline constexpr double first_inexact_float_label = 16777216.0;
+
+/// The class of a label as it is in a field or a file, whose upper 16 bits are the instance.
+/// Numbers that the kind does not have give `unlabeled`.
 [[nodiscard]] SemanticClass class_of_label(std::uint32_t raw_label, LabelKind kind);
 
 /// Tells from labels that are read as SemanticKITTI's whether they are: what is taken for the other
@@ -24,18 +29,22 @@ class LabelCensus {
  public:
   void add(std::uint32_t raw_label);
 
+  /// Without ids 0 and 65535 (-1 in 16 bits), which stand for "no label".
   [[nodiscard]] std::uint64_t labels() const { return labels_; }
   /// Of these, with an id that SemanticKITTI does not have; they count as unlabeled.
   [[nodiscard]] std::uint64_t unknown() const { return unknown_; }
-  /// Some ids are classes that SemanticKITTI does not use as ids, and none is beyond the classes.
-  [[nodiscard]] bool look_like_classes() const { return unknown_ > 0 && largest_ <= last_class; }
+  /// More ids are classes that SemanticKITTI does not use as ids than are beyond the classes. 255,
+  /// which stands for "ignore" beside classes, is neither.
+  [[nodiscard]] bool look_like_classes() const { return classes_alone_ > beyond_classes_; }
+  /// What is wrong with them, as the end of a sentence: "look like classes 0 to 19: ..."; empty
+  /// where they are what they are read as, but for a few.
+  [[nodiscard]] std::string doubt() const;
 
  private:
-  static constexpr std::uint32_t last_class = semantic_class_count - 1;
-
   std::uint64_t labels_ = 0;
   std::uint64_t unknown_ = 0;
-  std::uint32_t largest_ = 0;
+  std::uint32_t classes_alone_ = 0;
+  std::uint32_t beyond_classes_ = 0;
 };
 
 }  // namespace stillmap

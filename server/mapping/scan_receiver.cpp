@@ -302,15 +302,17 @@ void ScanReceiver::queue_scan(QueuedScan queued, const std::stop_token& stop) {
 
 void ScanReceiver::report_labels(const Lidar& lidar, const LabelCensus& census) {
   if (census.unknown() > 0) statistics_.count("unknown_labels", census.unknown());
-  if (!census.look_like_classes()) return;
-  statistics_.count("labels_look_like_classes");
+  const std::string doubt = census.doubt();
+  if (doubt.empty()) return;
+  const bool are_classes = census.look_like_classes();
+  const std::string counter = are_classes ? "labels_look_like_classes" : "labels_mostly_unknown";
+  statistics_.count(counter);
   // A line for each lidar: every scan says the same.
-  if (!layouts_.add(lidar.name + " label kind")) return;
+  if (!layouts_.add(lidar.name + counter)) return;
   spdlog::warn(
-      "labels on {} are read as SemanticKITTI ids and look like classes 0 to 19: set "
-      "'input.label_kind: classes', or 'labels.source: model' to do without them; counted as "
-      "labels_look_like_classes",
-      topic_);
+      "labels on {} are read as SemanticKITTI ids and {}: set {}'labels.source: model' to do "
+      "without them; counted as {}",
+      topic_, doubt, are_classes ? "'input.label_kind: classes', or " : "", counter);
 }
 
 void ScanReceiver::report(Lidar& lidar, const std::string& cloud_changes, const Scan& scan) {

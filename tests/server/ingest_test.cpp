@@ -109,5 +109,27 @@ TEST(ScanWithoutRings, IsMappedByTheElevationOfItsPoints) {
   }
 }
 
+/// Whether that counter comes to 3 when three scans come whose points have these labels in turn.
+bool counts_labels(const std::vector<std::uint32_t>& labels, const std::string& counter) {
+  const ServiceSetup setup("every");
+  const ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  ScanPublisher publisher(setup.publisher(true));
+  EXPECT_TRUE(publisher.wait_for_subscriber(patience));
+  for (int i = 0; i < 3; ++i) {
+    const Scan scan = room_scan(i);
+    std::vector<std::uint32_t> raw_labels(scan.size());
+    for (std::size_t k = 0; k < scan.size(); ++k) raw_labels[k] = labels[k % labels.size()];
+    EXPECT_TRUE(publisher.publish(scan, raw_labels, patience));
+  }
+  return eventually([&] { return client.status().counter(counter) == 3; });
+}
+
+TEST(LabelsOfScans, AreDoubtedWhereTheyAreClassesOrMostlyUnknown) {
+  EXPECT_TRUE(counts_labels({9, 13, 15, 17, 255, (7U << 16U) | 1U}, "labels_look_like_classes"));
+  EXPECT_TRUE(counts_labels({24, 26, 28, 30}, "labels_mostly_unknown"));
+}
+
 }  // namespace
 }  // namespace stillmap::test

@@ -29,15 +29,13 @@ std::optional<LabelKind> label_kind_of(const RecordingArguments& recording,
 
 /// What is wrong with the labels, and the ways out; else empty.
 std::string doubt_of_label_kind(const ScanDataset& dataset) {
-  const LabelCensus& census = dataset.label_census();
-  if (!census.look_like_classes()) return {};
+  const std::string doubt = dataset.label_census().doubt();
+  if (doubt.empty()) return {};
   return "the labels of " + dataset.file(0).string() +
-         " and others would be read as SemanticKITTI ids and look like classes 0 to 19: none is "
-         "beyond 19, and " +
-         std::to_string(census.unknown()) + " of " + std::to_string(census.labels()) +
-         " are no ids of SemanticKITTI. --label-kind classes reads them as such, --label-kind "
-         "semantic_kitti as they are; 'stillmap dataset export IN OUT --label-kind classes' "
-         "writes a sequence with ids for commands without that option";
+         " and others would be read as SemanticKITTI ids and " + doubt +
+         ". --label-kind classes reads them as classes (0 is unlabeled, 1 car: where 0 is car, add "
+         "1 first), --label-kind semantic_kitti as they are; 'stillmap dataset export IN OUT "
+         "--label-kind classes' writes a sequence with ids for commands without that option";
 }
 
 }  // namespace
@@ -59,7 +57,7 @@ ScanDataset open_recording(const std::string& path, const RecordingArguments& re
                            const std::string& config_file) {
   ScanDataset dataset = opened(path, recording.topic_in, label_kind_of(recording, config_file));
   const LabelCensus& census = dataset.label_census();
-  if (census.unknown() > 0 && !census.look_like_classes()) {
+  if (census.unknown() > 0 && census.doubt().empty()) {
     std::cerr << "stillmap: " << census.unknown() << " of " << census.labels()
               << " labels of some scans have ids that SemanticKITTI does not have: they count as "
                  "unlabeled\n";

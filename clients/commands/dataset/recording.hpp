@@ -31,7 +31,7 @@ void add_recording_options(CommandHandle command, RecordingArguments& recording)
                                          const std::string& config_file = {});
 
 /// Throws std::invalid_argument, with the ways out, where labels are read as SemanticKITTI ids and
-/// look like classes.
+/// look like something else.
 void require_semantic_kitti_labels(const ScanDataset& dataset);
 /// Says the same on standard error.
 void warn_of_label_kind(const ScanDataset& dataset);
