@@ -10,6 +10,7 @@
 
 #include "core/dataset/cloud_content.hpp"
 #include "core/dataset/dataset_error.hpp"
+#include "core/lidar/label_kind.hpp"
 #include "core/lidar/point_fields.hpp"
 
 namespace stillmap {
@@ -94,6 +95,14 @@ std::vector<T> whole_numbers(const std::optional<Column>& column) {
   return values;
 }
 
+/// The same; also empty where floats of 32 bits cannot hold them.
+std::vector<std::uint32_t> labels_of(const CloudContent& cloud, const PointFieldNames& names) {
+  const auto label = find_column(cloud, names.label);
+  const bool is_float32 = label && label->field.kind == 'F' && label->field.bytes == 4;
+  if (is_float32 && !label->all_within(0.0, first_inexact_float_label - 1.0)) return {};
+  return whole_numbers<std::uint32_t>(label);
+}
+
 constexpr std::size_t pcd_point_bytes = 24;
 constexpr std::size_t ply_point_bytes = 23;
 
@@ -155,7 +164,7 @@ CloudFile read_point_cloud(const std::filesystem::path& file, std::int64_t stamp
   read.scan.intensity = intensity_of(cloud, names);
   read.scan.time_offset_s = time_offsets_of(cloud, names, stamp_ns);
   read.scan.ring = whole_numbers<std::uint16_t>(find_column(cloud, names.ring));
-  read.raw_labels = whole_numbers<std::uint32_t>(find_column(cloud, names.label));
+  read.raw_labels = labels_of(cloud, names);
   return read;
 }
 

@@ -201,7 +201,7 @@ PointTimes read_time(const PointCloud2& cloud, const CloudLayout& layout, std::i
 }
 
 /// A label as it is in the field. No number is 0, as padding points of organised clouds have it;
-/// nothing for one that no field of whole numbers could hold.
+/// nothing for one that is not whole, or that this type may have rounded.
 template <typename T>
 std::optional<std::uint32_t> whole_label(T value) {
   if constexpr (std::is_integral_v<T>) {
@@ -209,7 +209,8 @@ std::optional<std::uint32_t> whole_label(T value) {
   } else {
     if (!std::isfinite(value)) return 0U;
     const auto label = static_cast<double>(value);
-    if (label < 0.0 || label > 4294967295.0 || label != std::floor(label)) return std::nullopt;
+    constexpr double end = sizeof(T) == 4 ? first_inexact_float_label : 4294967296.0;
+    if (label < 0.0 || label >= end || label != std::floor(label)) return std::nullopt;
     return static_cast<std::uint32_t>(label);
   }
 }
@@ -239,7 +240,10 @@ ReadLabels read_labels(const PointCloud2& cloud, const CloudLayout& layout,
     if (!are_classes) read.census.add(label.value_or(0));
     if (options.keeps_raw_labels) read.raw.push_back(label.value_or(0));
   });
-  if (!are_whole) return {{}, "ignored: not whole numbers"};
+  const bool is_float32 = layout.label->type == FieldType::float32;
+  if (!are_whole)
+    return {{},
+            is_float32 ? "ignored: not whole numbers below 2^24" : "ignored: not whole numbers"};
   return read;
 }
 

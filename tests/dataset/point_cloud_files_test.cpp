@@ -76,6 +76,18 @@ TEST(PointCloudFiles, ReadsAllFieldsAndPassesOverPadding) {
   EXPECT_THAT(cloud.raw_labels, ElementsAre((9U << 16U) | 252U, 40U));
 }
 
+TEST(PointCloudFiles, LeavesLabelsOutThatFloatsHaveRounded) {
+  const ScratchFolder folder;
+  const auto labels_from = [&](float label) {
+    const std::string header =
+        pcd_header("x y z label", "4 4 4 4", "F F F F", "1 1 1 1", 1, "binary");
+    const std::string body = header + packed(1.0F, 2.0F, 3.0F, label);
+    return read_point_cloud(folder.file("a.pcd", body), 0).raw_labels;
+  };
+  EXPECT_THAT(labels_from(255.0F * 65536.0F + 50.0F), ElementsAre((255U << 16U) | 50U));
+  EXPECT_THAT(labels_from(256.0F * 65536.0F), testing::IsEmpty());
+}
+
 TEST(PointCloudFiles, ReadsNanosecondOffsetsAndAbsoluteDoubles) {
   const ScratchFolder folder;
   const auto nanoseconds = folder.file(

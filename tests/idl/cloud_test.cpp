@@ -268,6 +268,25 @@ TEST(CloudToScan, LeavesLabelsInFloatsOutThatAreNoWholeNumbers) {
   }
 }
 
+TEST(CloudToScan, LeavesLabelsOutThatFloatsHaveRounded) {
+  // Ids with instances: 2 << 16 | 50 stays whole, 256 << 16 | 50 becomes the next multiple of 2.
+  const auto exact =
+      three_points_with<float>("label", FieldType::float32, {40.0F, 131122.0F, 0.0F});
+  EXPECT_THAT(to_scan(exact, {}).scan->labels,
+              ElementsAre(SemanticClass::road, SemanticClass::building, SemanticClass::unlabeled));
+  for (const float rounded : {16777216.0F, 1000.0F * 65536.0F}) {
+    const auto cloud =
+        three_points_with<float>("label", FieldType::float32, {40.0F, rounded, 0.0F});
+    const ScanFromCloud back = to_scan(cloud, {});
+    EXPECT_TRUE(back.scan->labels.empty()) << rounded;
+    EXPECT_EQ(back.label_census.labels(), 0U);
+    EXPECT_THAT(back.format, HasSubstr("float32: ignored: not whole numbers below 2^24"));
+  }
+  const auto doubles =
+      three_points_with<double>("label", FieldType::float64, {40.0, 1000.0 * 65536.0 + 50.0, 0.0});
+  EXPECT_EQ(to_scan(doubles, {}).scan->labels[1], SemanticClass::building);
+}
+
 TEST(CloudToScan, SaysWhatTheLabelFieldIsTakenFor) {
   const auto bytes = three_points_with<std::uint8_t>("label", FieldType::uint8, {1, 2, 3});
   const auto ids = three_points_with<std::uint32_t>("label", FieldType::uint32, {10, 40, 50});
