@@ -162,7 +162,8 @@ SweepMerger::SweepMerger(const Config& config)
 
 std::size_t SweepMerger::add(std::size_t lidar, Scan scan, double now_s) {
   is_silent_[lidar] = false;
-  if (is_labelled(scan)) sends_labels_[lidar] = true;
+  const bool has_points_alone = !scan.empty() && scan.labels.empty();
+  if (is_labelled(scan) || has_points_alone) sends_labels_[lidar] = !has_points_alone;
   Rhythm& rhythm = rhythms_[lidar];
   rhythm = {.newest_ns = scan.stamp_ns,
             .step_ns = rhythm.newest_ns ? scan.stamp_ns - *rhythm.newest_ns : 0,

@@ -65,7 +65,7 @@ class SweepMerger {
     Scan scan;
     /// Lidars that sent nothing in time, but for those that were not due.
     std::vector<std::size_t> missing;
-    /// Some lidars sent labels, others never did.
+    /// Some lidars sent labels, others send none.
     bool is_partly_labelled = false;
   };
 
@@ -122,7 +122,7 @@ class SweepMerger {
   /// In the order of arrival.
   std::vector<std::deque<Waiting>> lidars_;
   std::vector<bool> is_silent_;
-  /// Lidars of which a point had a class.
+  /// Lidars of which a point had a class, and whose clouds have had a label field since then.
   std::vector<bool> sends_labels_;
   std::vector<Rhythm> rhythms_;
   std::optional<std::int64_t> last_stamp_ns_;

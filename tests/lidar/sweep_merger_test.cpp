@@ -173,6 +173,23 @@ TEST(SweepMerger, RemembersWhichLidarsSendLabels) {
   EXPECT_THAT(sweep.scan.labels, ElementsAre(car, unknown));
 }
 
+TEST(SweepMerger, ForgetsThatALidarSentLabelsWhenItsScansHaveNone) {
+  SweepMerger merger({.lidars = 2, .partial_labels = PartialLabels::drop});
+  Scan front = scan_at(1000, 1.0F), rear = scan_at(1000, 2.0F);
+  front.labels = rear.labels = {SemanticClass::car};
+  const auto sweep_of = [&](std::int64_t stamp_ms, Scan from_rear) {
+    front.stamp_ns = from_rear.stamp_ns = stamp_ms * ms;
+    EXPECT_EQ(merger.add(0, front, 0.0) + merger.add(1, std::move(from_rear), 0.0), 0U);
+    return merger.next(0.0).value();
+  };
+  EXPECT_FALSE(sweep_of(1000, rear).is_partly_labelled);
+  EXPECT_FALSE(sweep_of(1100, Scan{}).is_partly_labelled) << "nothing was within its range";
+  const auto without = sweep_of(1200, scan_at(1200, 2.0F));
+  EXPECT_TRUE(without.is_partly_labelled) << "its driver was started again, without labels";
+  EXPECT_THAT(without.scan.labels, IsEmpty()) << "the network labels all points";
+  EXPECT_FALSE(sweep_of(1300, rear).is_partly_labelled);
+}
+
 TEST_F(Merger, PairsScansByStampNotByArrival) {
   // The first one comes while the other still sends the sweep before.
   EXPECT_EQ(merger_.add(1, scan_at(940, 2.0F), 0.0), 0U);
