@@ -215,13 +215,13 @@ void ScanDataset::learn_from_sample() {
   std::vector<float> full_scales;
   std::optional<DatasetError> fault;
   const auto count_label = [this](std::uint32_t label) { label_census_.add(label); };
-  bool brings_labels = false, is_any_known = false;
   for (const std::size_t i : sample()) {
     try {
       const DatasetFrame frame = read_unscaled(i);
-      if (readable.empty()) brings_labels = !frame.raw_labels.empty();
       if (!label_kind_) std::ranges::for_each(frame.raw_labels, count_label);
-      is_any_known |= has_known_class(reduced_classes(frame.raw_labels));
+      const bool is_labelled = has_known_class(reduced_classes(frame.raw_labels));
+      has_labels_ |= is_labelled;
+      lacks_labels_ |= !is_labelled && !frame.scan.empty();
       readable.emplace_back(frame.scan.size(), i);
       full_scales.push_back(intensity_full_scale(frame.scan.intensity));
     } catch (const DatasetError& error) {
@@ -229,7 +229,6 @@ void ScanDataset::learn_from_sample() {
     }
   }
   if (readable.empty()) throw DatasetError(*fault);
-  has_labels_ = brings_labels && is_any_known;
   std::ranges::sort(readable);
   const Scan typical = read_unscaled(readable[readable.size() / 2].second).scan;
   // The brightest but one of many: dark scans say too little, broken ones too much.
@@ -279,6 +278,13 @@ fs::path ScanDataset::beside(std::size_t i, const char* folder, const char* exte
 bool ScanDataset::has_labels(std::size_t i) const {
   return file(i).extension() == ".bin" ? fs::exists(beside(i, "labels", ".label"))
                                        : !read(i).raw_labels.empty();
+}
+
+bool ScanDataset::lacks_labels() const {
+  if (lacks_labels_ || sequence_.empty() || file(0).extension() != ".bin") return lacks_labels_;
+  for (std::size_t i = 0; i < size(); ++i)
+    if (!has_labels(i)) return true;
+  return false;
 }
 
 DatasetFrame ScanDataset::read_unscaled(std::size_t i) const {

@@ -44,9 +44,11 @@ class ScanDataset {
   /// From times.txt, else from the file's name, else 0.1 s apart from 0.
   [[nodiscard]] std::int64_t stamp_ns(std::size_t i) const { return stamps_ns_.at(i); }
 
-  /// Whether scans come with labels: as the first of some from all over the dataset that can be
-  /// read. Labels without one known class, as where PCL's PointXYZL was saved unfilled, are none.
+  /// Whether scans come with labels: any of some from all over the dataset that can be read. Labels
+  /// without one known class, as where PCL's PointXYZL was saved unfilled, are none.
   [[nodiscard]] bool has_labels() const { return has_labels_; }
+  /// Whether others come without: any of the same, or one that has no file in labels/.
+  [[nodiscard]] bool lacks_labels() const;
   /// The labels of those scans, where nobody told of which kind they are; else none.
   [[nodiscard]] const LabelCensus& label_census() const { return label_census_; }
   /// Whether this one does. Throws as read() does.
@@ -105,6 +107,7 @@ class ScanDataset {
   LabelCensus label_census_;
   float intensity_scale_ = 1.0F;
   bool has_labels_ = false;
+  bool lacks_labels_ = false;
   SensorModel suggested_sensor_;
   std::optional<KittiLidar> kitti_lidar_;
 };

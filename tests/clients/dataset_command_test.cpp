@@ -224,6 +224,21 @@ TEST_F(DatasetCommandTest, RefusesClassesThatWouldBeReadAsIdsUntilItIsToldWhatTh
               class_from_semantic_kitti(ids[i] & 0xFFFFU));
 }
 
+TEST_F(DatasetCommandTest, LabelsByTheModelWhatComesWithoutLabels) {
+  simulate("city", 4);
+  std::filesystem::remove(path("city/labels/000002.label"));
+  const auto mapped = [&](const std::string& labels) {
+    const ProcessResult result =
+        run("map " + path("city") + " --out " + path("map_") + labels + " --labels " + labels);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result;
+  };
+  EXPECT_THAT(mapped("auto").out, HasSubstr("labels: stream, else street"));
+  const ProcessResult without = mapped("files");
+  EXPECT_THAT(without.out, HasSubstr("labels: stream;"));
+  EXPECT_THAT(without.err, HasSubstr("some scans have no labels"));
+}
+
 TEST_F(DatasetCommandTest, NamesWhatItCannotUse) {
   simulate("city", 2);
   const auto refusal = [&](const std::string& arguments) {

@@ -95,6 +95,31 @@ TEST(ScanDataset, TakesAFieldThatNobodyFilledForNoLabels) {
   EXPECT_FALSE(ScanDataset(folder.path()).has_labels());
 }
 
+TEST(ScanDataset, TellsWhetherSomeScansLackLabels) {
+  const ScratchFolder folder;
+  KittiSequenceWriter writer(folder.path());
+  // More than are looked at when it is opened.
+  constexpr int scans = 12;
+  const std::vector<std::uint32_t> cars(3, 10);
+  for (int k = 0; k < scans; ++k) writer.add(small_scan(3, 100 * k), cars, pose_at(k, 0.0));
+  writer.finish();
+  const auto remove_labels = [&](int scan) {
+    const std::string name = (scan < 10 ? "00000" : "0000") + std::to_string(scan);
+    std::filesystem::remove(folder.path() / "labels" / (name + ".label"));
+  };
+  const auto labels = [&] {
+    const ScanDataset dataset(folder.path());
+    return std::pair(dataset.has_labels(), dataset.lacks_labels());
+  };
+  EXPECT_EQ(labels(), std::pair(true, false));
+  remove_labels(5);
+  EXPECT_EQ(labels(), std::pair(true, true)) << "one in the midst";
+  remove_labels(0);
+  EXPECT_EQ(labels(), std::pair(true, true)) << "the first one";
+  for (int k = 1; k < scans; ++k) remove_labels(k);
+  EXPECT_EQ(labels(), std::pair(false, true));
+}
+
 TEST(ScanDataset, ReadsLabelsOfTheKindThatItIsTold) {
   const ScratchFolder folder;
   KittiSequenceWriter writer(folder.path());

@@ -59,7 +59,7 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments) {
   command
       .option(
           "--labels", arguments.labels,
-          "Where classes come from: auto (the data set's, if it has any, else the model's), "
+          "Where classes come from: auto (each scan's own, if it has any, else the model's), "
           "files (must have them), model (the default one that comes with Stillmap), none (pure "
           "geometry), the name of one that comes with Stillmap (street, kitti), or a folder "
           "with a model")
@@ -133,10 +133,13 @@ LabelsConfig labels_config(const MapperArguments& arguments, const ScanDataset& 
   } else if (arguments.labels != "auto") {
     labels.source = LabelProvider::model;
     labels.model = arguments.labels;
-  } else if (labels.source == LabelProvider::automatic) {
-    labels.source = dataset.has_labels() ? LabelProvider::stream : LabelProvider::model;
+  } else if (labels.source == LabelProvider::automatic && !dataset.has_labels()) {
+    labels.source = LabelProvider::model;
+  } else if (labels.source == LabelProvider::automatic && !dataset.lacks_labels()) {
+    labels.source = LabelProvider::stream;
   }
-  if (labels.source == LabelProvider::stream) require_semantic_kitti_labels(dataset);
+  if (labels.source == LabelProvider::stream || labels.source == LabelProvider::automatic)
+    require_semantic_kitti_labels(dataset);
   if (arguments.columns > 0) labels.image_columns = static_cast<int>(arguments.columns);
   set_engine(arguments.engine, labels.engine);
   return labels;
@@ -154,11 +157,14 @@ std::unique_ptr<Segmenter> make_segmenter(const MapperArguments& arguments,
 
 std::string describe_model(const MapperArguments& arguments, const ScanDataset& dataset,
                            const Segmenter& segmenter) {
+  const LabelsConfig labels = labels_config(arguments, dataset);
+  if (labels.source == LabelProvider::stream && dataset.has_labels() && dataset.lacks_labels())
+    return "stillmap: some scans have no labels, and no point of them gets a class: --labels auto "
+           "has the model label them\n";
   if (segmenter.details().empty()) return {};
   std::string text = "stillmap: labels by " + segmenter.name() + ": " + segmenter.details() + "\n";
   const std::string better =
-      better_model(labels_config(arguments, dataset),
-                   mapper_config(arguments, dataset.suggested_sensor()).sensor);
+      better_model(labels, mapper_config(arguments, dataset.suggested_sensor()).sensor);
   if (!better.empty()) text += "stillmap: " + better + "; --labels chooses\n";
   return text;
 }

@@ -59,7 +59,7 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments);
     const MapperArguments& arguments, const ScanDataset& dataset,
     const Eigen::Isometry3d& T_base_lidar = Eigen::Isometry3d::Identity());
 /// Lines that tell which model labels the scans, and whether another one was trained for lidars
-/// more like theirs; empty without a network.
+/// more like theirs; without a network, whether some scans stay without labels.
 [[nodiscard]] std::string describe_model(const MapperArguments& arguments,
                                          const ScanDataset& dataset, const Segmenter& segmenter);
 /// A line that tells why most of the data set's scans cannot come from this sensor; empty when they
