@@ -118,18 +118,34 @@ struct SharedRecording {
   std::mutex reading;
 };
 
+/// Throws DatasetError, with the ways out, where nobody says what the labels are and they are no
+/// SemanticKITTI ids by their looks.
+void require_semantic_kitti_labels(const ScanDataset& dataset, const std::filesystem::path& path) {
+  const std::string doubt = dataset.label_census().doubt();
+  if (doubt.empty()) return;
+  throw DatasetError(path, "its labels would be read as SemanticKITTI ids and " + doubt +
+                               ". labels_are_classes=True reads them as classes (0 is unlabeled, 1 "
+                               "car), labels_are_classes=False as ids all the same");
+}
+
 void bind_open_dataset(py::module_& module) {
   module.def(
       "open_dataset",
-      [](const std::filesystem::path& path, const std::string& topic, bool labels_are_classes) {
+      [](const std::filesystem::path& path, const std::string& topic,
+         std::optional<bool> labels_are_classes) {
         const py::gil_scoped_release released;
-        const auto kind = labels_are_classes ? std::optional(LabelKind::classes) : std::nullopt;
-        return std::make_unique<SharedRecording>(dds::open_recording(path, topic, kind));
+        std::optional<LabelKind> kind;
+        if (labels_are_classes)
+          kind = *labels_are_classes ? LabelKind::classes : LabelKind::semantic_kitti;
+        auto shared = std::make_unique<SharedRecording>(dds::open_recording(path, topic, kind));
+        require_semantic_kitti_labels(shared->recording.dataset, path);
+        return shared;
       },
-      py::arg("path"), py::arg("topic") = "", py::arg("labels_are_classes") = false,
+      py::arg("path"), py::arg("topic") = "", py::arg("labels_are_classes") = py::none(),
       "Opens a KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, or a ROS 2 bag "
-      "(SQLite or MCAP). topic: of a bag with several topics of scans. labels_are_classes: "
-      "its labels are classes 0 to 19, not SemanticKITTI's ids. Raises DatasetError.");
+      "(SQLite or MCAP). topic: of a bag with several topics of scans. labels_are_classes: True: "
+      "its labels are classes 0 to 19; False: they are SemanticKITTI's ids; None: they are ids, "
+      "unless they do not look like it. Raises DatasetError, then, too.");
 }
 
 }  // namespace

@@ -19,6 +19,20 @@ def test_scans_are_the_files(city):
     assert dataset.faults == []
 
 
+def test_classes_are_not_read_as_ids_without_a_word(city, tmp_path):
+    (tmp_path / "labels").mkdir()
+    (tmp_path / "velodyne").symlink_to(city / "velodyne")
+    for file in (city / "velodyne").glob("*.bin"):
+        classes = np.resize(np.array([9, 13, 15, 17, 255], np.uint32), file.stat().st_size // 16)
+        classes.tofile(tmp_path / "labels" / (file.stem + ".label"))
+    with pytest.raises(stillmap.DatasetError, match="look like classes.*labels_are_classes=True"):
+        stillmap.open_dataset(tmp_path)
+    told = stillmap.open_dataset(tmp_path, labels_are_classes=True)
+    assert list(told[0].labels[:5]) == [9, 13, 15, 17, 0]
+    as_ids = stillmap.open_dataset(tmp_path, labels_are_classes=False)
+    assert list(as_ids[0].raw_labels[:5]) == [9, 13, 15, 17, 255]
+
+
 def test_places_count_as_in_a_list(city):
     dataset = stillmap.open_dataset(city)
     np.testing.assert_array_equal(dataset[-1].points_lidar, dataset[len(dataset) - 1].points_lidar)

@@ -95,7 +95,7 @@ class Dataset:
     def faults(self) -> list[str]: ...
 
 def open_dataset(
-    path: Path, topic: str = "", labels_are_classes: bool = False
+    path: Path, topic: str = "", labels_are_classes: bool | None = None
 ) -> Dataset: ...
 
 class Voxels:
