@@ -1,5 +1,6 @@
 #include <sstream>
 
+#include "core/dataset/kitti_files.hpp"
 #include "tests/clients/command_test.hpp"
 
 namespace stillmap::test {
@@ -167,6 +168,27 @@ TEST_F(EvaluateCommandTest, ScoresSeveralSequencesEachTogetherAndByRange) {
       run("evaluate segmentation --truth " + truth + " --predictions " + path("city/labels"));
   EXPECT_EQ(both.exit_code, 2);
   EXPECT_THAT(both.err, HasSubstr("--truth names 2"));
+}
+
+TEST_F(EvaluateCommandTest, RefusesPredictionsOfClassesInsteadOfIds) {
+  simulate("city", 1);
+  const auto ids = read_kitti_labels(path("city/labels/000000.label"),
+                                     content("city/labels/000000.label").size() / 4);
+  std::vector<std::uint32_t> classes(ids.size(), 255);
+  for (std::size_t i = 1; i < ids.size(); ++i)
+    classes[i] = static_cast<std::uint32_t>(class_from_semantic_kitti(ids[i] & 0xFFFFU));
+  std::filesystem::create_directories(folder_ / "classes");
+  write_kitti_labels(path("classes/000000.label"), classes);
+  const auto comparing = [&](const std::string& truth, const std::string& predictions) {
+    return run("evaluate segmentation --truth " + path(truth) + " --predictions " +
+               path(predictions));
+  };
+  EXPECT_EQ(comparing("city", "city/labels").exit_code, 0);
+  for (const ProcessResult& refused :
+       {comparing("city", "classes"), comparing("classes", "city/labels")}) {
+    EXPECT_EQ(refused.exit_code, 2) << refused.out;
+    EXPECT_THAT(refused.err, AllOf(HasSubstr("classes"), HasSubstr("remap_semantic_labels.py")));
+  }
 }
 
 TEST_F(EvaluateCommandTest, RefusesPredictionsThatDoNotFit) {

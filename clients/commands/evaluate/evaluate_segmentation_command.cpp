@@ -80,6 +80,16 @@ std::vector<std::filesystem::path> label_files(const std::filesystem::path& fold
   return files;
 }
 
+/// Throws std::invalid_argument where they look like something else than SemanticKITTI's ids.
+void require_semantic_kitti_ids(const LabelCensus& census, const std::filesystem::path& folder) {
+  const std::string doubt = census.doubt();
+  if (doubt.empty()) return;
+  throw std::invalid_argument("the labels in " + folder.string() +
+                              " are read as SemanticKITTI ids and " + doubt +
+                              ". Write them as ids first: remap_semantic_labels.py --inverse of "
+                              "SemanticKITTI's tools does");
+}
+
 SequenceScore compare_files(const EvaluateSegmentationArguments& arguments) {
   const std::string& truth = arguments.truth.front();
   auto predictions = label_files(arguments.predictions, "predictions");
@@ -93,6 +103,7 @@ SequenceScore compare_files(const EvaluateSegmentationArguments& arguments) {
   const std::filesystem::path truth_folder = label_files(truth, "labels").front().parent_path();
   Progress progress("compare", "scans", predictions.size());
   SequenceScore compared{.sequence = truth, .score = {}};
+  LabelCensus predicted, known;
   std::uint64_t done = 0;
   for (const std::filesystem::path& prediction : predictions) {
     const auto classes = read_values<std::uint32_t>(prediction);
@@ -106,9 +117,13 @@ SequenceScore compare_files(const EvaluateSegmentationArguments& arguments) {
                                          file.string() + " has " +
                                          std::to_string(true_classes.size()));
     }
+    for (const std::uint32_t label : classes) predicted.add(label);
+    for (const std::uint32_t label : true_classes) known.add(label);
     compared.score.add({}, reduced_classes(true_classes), reduced_classes(classes));
     progress.update(++done);
   }
+  require_semantic_kitti_ids(predicted, predictions.front().parent_path());
+  require_semantic_kitti_ids(known, truth_folder);
   return compared;
 }
 
