@@ -239,6 +239,17 @@ TEST_F(DatasetCommandTest, LabelsByTheModelWhatComesWithoutLabels) {
   EXPECT_THAT(without.err, HasSubstr("some scans have no labels"));
 }
 
+TEST_F(DatasetCommandTest, ExportSaysWhereLabelsComeFrom) {
+  simulate("city", 2);
+  const std::string to_copy = "dataset export " + path("city") + " " + path("copy") + " --force";
+  EXPECT_THAT(run(to_copy + " --labels none").out, HasSubstr("with a label from 'stream')"));
+  std::filesystem::remove(path("city/labels/000001.label"));
+  EXPECT_THAT(run(to_copy + " --labels none").out,
+              HasSubstr("with a label from 'stream, else none')"));
+  std::filesystem::remove_all(path("city/labels"));
+  EXPECT_THAT(run(to_copy + " --labels none").out, HasSubstr("(0 with a label from 'none')"));
+}
+
 TEST_F(DatasetCommandTest, NamesWhatItCannotUse) {
   simulate("city", 2);
   const auto refusal = [&](const std::string& arguments) {

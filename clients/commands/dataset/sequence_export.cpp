@@ -8,6 +8,8 @@
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/gnss_file.hpp"
 #include "core/dataset/imu_file.hpp"
+#include "core/lidar/label_kind.hpp"
+#include "core/segmentation/segmenter.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -63,6 +65,7 @@ class SequenceExporter {
     if (!frame) return;
     const std::optional<MappedScan> mapped = mapper_.process(frame->scan);
     std::vector<std::uint32_t> raw_labels = frame->raw_labels;
+    scans_with_labels_ += raw_labels.empty() ? 0U : 1U;
     if (mapped) {
       T_map_lidar_ = mapped->odometry.T_map_lidar;
       if (raw_labels.empty()) {
@@ -82,7 +85,7 @@ class SequenceExporter {
 
   ExportSummary finish(bool stopped) {
     ExportSummary summary = output_.finish();
-    summary.label_source = mapper_.label_source();
+    summary.label_source = label_source(summary.scans);
     summary.stopped = stopped;
     summary.imu_samples = imu_samples_;
     summary.gnss_fixes = gnss_fixes_;
@@ -105,6 +108,13 @@ class SequenceExporter {
     }
   }
 
+  /// What comes with a scan is copied, whatever the segmenter.
+  std::string label_source(std::size_t scans) const {
+    const std::string own = PassthroughSegmenter().name(), other = mapper_.label_source();
+    if (scans_with_labels_ == 0 || other.starts_with(own)) return other;
+    return scans_with_labels_ < scans ? own + ", else " + other : own;
+  }
+
   const ScanDataset& dataset_;
   bool strict_;
   const ScanSkipped& scan_skipped_;
@@ -118,6 +128,7 @@ class SequenceExporter {
   Eigen::Isometry3d T_map_lidar_ = Eigen::Isometry3d::Identity();
   std::size_t damaged_ = 0;
   std::size_t without_pose_ = 0;
+  std::size_t scans_with_labels_ = 0;
 };
 
 /// Whether it is this folder or file, or beneath it.
@@ -167,8 +178,11 @@ void SequenceOutput::add(const Scan& scan, std::vector<std::uint32_t> raw_labels
   writer_.add(scan, raw_labels, T_map_lidar);
   summary_.scans += 1;
   summary_.points += scan.size();
-  summary_.labelled_points += static_cast<std::uint64_t>(
-      std::ranges::count_if(raw_labels, [](std::uint32_t raw) { return (raw & 0xFFFFU) != 0; }));
+  const auto has_class = [](std::uint32_t raw) {
+    return class_of_label(raw, LabelKind::semantic_kitti) != SemanticClass::unlabeled;
+  };
+  summary_.labelled_points +=
+      static_cast<std::uint64_t>(std::ranges::count_if(raw_labels, has_class));
 }
 
 ExportSummary SequenceOutput::finish() const {

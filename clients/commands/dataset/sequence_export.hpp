@@ -24,8 +24,9 @@ void prepare_sequence_folder(const std::filesystem::path& folder, bool force,
 struct ExportSummary {
   std::size_t scans = 0;
   std::uint64_t points = 0;
-  /// Points that have a label from the data set or the label source.
+  /// Points that have a class by the data set or the label source.
   std::uint64_t labelled_points = 0;
+  /// As Segmenter::name(); "stream" where scans brought their labels, whatever the segmenter.
   std::string label_source;
   std::size_t imu_samples = 0;
   std::size_t gnss_fixes = 0;
