@@ -31,6 +31,7 @@ std::optional<Int8Calibration> load_int8_calibration(const fs::path& file) {
     YamlSection section(yaml);
     section.require({"ranges"});
     section.text("made", calibration.made);
+    section.text("network_crc32", calibration.network_crc32);
     section.text_list("float_layers", calibration.float_layers);
     read_ranges(section.section("ranges"), calibration.range_of_channels);
   }
@@ -42,6 +43,10 @@ void save_int8_calibration(const Int8Calibration& calibration, const fs::path& f
   YAML::Emitter text;
   text << YAML::Comment("Written by 'stillmap model calibrate'.") << YAML::BeginMap;
   text << YAML::Key << "made" << YAML::Value << YAML::DoubleQuoted << calibration.made;
+  if (!calibration.network_crc32.empty()) {
+    text << YAML::Key << "network_crc32" << YAML::Value << YAML::DoubleQuoted
+         << calibration.network_crc32 << YAML::Comment("of model.onnx, to which the ranges belong");
+  }
   text << YAML::Key << "float_layers" << YAML::Value << YAML::Flow << YAML::BeginSeq;
   for (const std::string& layer : calibration.float_layers) text << YAML::DoubleQuoted << layer;
   text << YAML::EndSeq;

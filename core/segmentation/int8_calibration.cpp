@@ -1,10 +1,16 @@
 #include "core/segmentation/int8_calibration.hpp"
 
+#include <zlib.h>
+
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cassert>
 #include <cmath>
+#include <fstream>
+#include <iomanip>
 #include <numeric>
+#include <sstream>
 
 #include "core/segmentation/graph/network_graph.hpp"
 
@@ -140,6 +146,26 @@ void multiply_inputs(Convolution& c, const Factors& factors) {
 }
 
 }  // namespace
+
+std::string crc32_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return {};
+  std::array<char, 65536> bytes{};
+  uLong crc = crc32(0, nullptr, 0);
+  while (in.read(bytes.data(), bytes.size()) || in.gcount() > 0)
+    crc = crc32(crc, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(in.gcount()));
+  std::ostringstream text;
+  text << std::hex << std::setw(8) << std::setfill('0') << crc;
+  return text.str();
+}
+
+std::string float_layer_fault(std::span<const std::string> layers,
+                              const Int8Calibration& calibration) {
+  for (const std::string& name : calibration.float_layers)
+    if (std::ranges::find(layers, name) == layers.end())
+      return "float_layers: '" + name + "' is no layer of the network";
+  return {};
+}
 
 std::string calibration_fault(const NetworkGraph& graph, const Int8Calibration& calibration) {
   for (const Tensor& tensor : graph.tensors) {

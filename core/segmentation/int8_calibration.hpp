@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <span>
 #include <string>
@@ -18,7 +19,12 @@ struct Int8Calibration {
   std::map<std::string, std::vector<float>> range_of_channels;
   /// Layers that stay in floating point, besides the first and the last.
   std::vector<std::string> float_layers;
+  /// crc32_of() the network's file that it was made with; empty where that is not known.
+  std::string network_crc32 = {};
 };
+
+/// CRC-32 of a file's bytes as eight hexadecimal digits; empty where it cannot be read.
+[[nodiscard]] std::string crc32_of(const std::filesystem::path& file);
 
 /// Histograms of the magnitudes in a network's tensors, from which a calibration is made.
 class ActivationRanges {
@@ -42,6 +48,10 @@ class ActivationRanges {
 
   std::map<std::string, std::vector<Histogram>> channels_of_tensor_;
 };
+
+/// Which float layer is none of these layers of a network's file; empty where all are.
+[[nodiscard]] std::string float_layer_fault(std::span<const std::string> layers,
+                                            const Int8Calibration& calibration);
 
 /// Why this calibration is not one of this network (after infer_shapes()), with the tensor and the
 /// numbers; empty where it is. Tensors without an entry are no fault here: some need none.

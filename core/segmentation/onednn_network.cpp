@@ -16,25 +16,40 @@
 namespace stillmap {
 namespace {
 
-/// The graph in this precision; for int8 its channels are equalised first.
-std::unique_ptr<CompiledPlan> compile(Precision precision, NetworkGraph& graph,
-                                      const ModelDescription& model, int threads) {
-  std::optional<Int8Calibration> calibration;
-  if (precision == Precision::int8) {
-    if (!model.int8) {
-      throw ModelError(
-          model.network_file,
-          "has no int8.yaml beside it; make it with 'stillmap model calibrate', or use "
-          "precision: fp32");
-    }
-    if (const std::string fault = calibration_fault(graph, *model.int8); !fault.empty()) {
-      throw ModelError(model.network_file.parent_path() / "int8.yaml",
-                       fault +
-                           "; the file is damaged or another network's: calibrate again with "
-                           "'stillmap model calibrate', or use precision: fp32");
-    }
-    calibration = equalise_channels(graph, *model.int8);
+/// Throws ModelError where the model has no calibration, or one of another network.
+const Int8Calibration& calibration_of(const ModelDescription& model,
+                                      const PreparedNetwork& network) {
+  if (!model.int8) {
+    throw ModelError(model.network_file,
+                     "has no int8.yaml beside it; make it with 'stillmap model calibrate', or use "
+                     "precision: fp32");
   }
+  const std::filesystem::path file = model.network_file.parent_path() / "int8.yaml";
+  const std::string& made_with = model.int8->network_crc32;
+  const std::string present = made_with.empty() ? "" : crc32_of(model.network_file);
+  if (made_with != present) {
+    throw ModelError(file, "was made with another " + model.network_file.filename().string() +
+                               " (network_crc32 is " + made_with + ", that of the file " + present +
+                               "): calibrate again with 'stillmap model calibrate', or use "
+                               "precision: fp32");
+  }
+  std::string fault = float_layer_fault(network.file_layers, *model.int8);
+  if (fault.empty()) fault = calibration_fault(network.graph, *model.int8);
+  if (!fault.empty()) {
+    throw ModelError(file, fault +
+                               "; the file is damaged or another network's: calibrate again with "
+                               "'stillmap model calibrate', or use precision: fp32");
+  }
+  return *model.int8;
+}
+
+/// The graph in this precision; for int8 its channels are equalised first.
+std::unique_ptr<CompiledPlan> compile(Precision precision, PreparedNetwork& network,
+                                      const ModelDescription& model, int threads) {
+  NetworkGraph& graph = network.graph;
+  std::optional<Int8Calibration> calibration;
+  if (precision == Precision::int8)
+    calibration = equalise_channels(graph, calibration_of(model, network));
   const auto compiled = [&](FloatSummand float_summand) {
     const ExecutionPlan plan =
         plan_execution(graph, calibration ? &*calibration : nullptr, float_summand);
@@ -75,7 +90,7 @@ OneDnnNetwork::OneDnnNetwork(const ModelDescription& model, Precision precision,
     state_->outputs = model.classes.size();
     state_->precision = precision;
     state_->giga_operations = network.giga_operations;
-    state_->plan = compile(precision, graph, model, threads);
+    state_->plan = compile(precision, network, model, threads);
     const std::span<const float> scores = state_->plan->run(trial_input(model));
     require_finite_scores(model, scores);
     if (!network.had_softmax) {

@@ -18,17 +18,25 @@ Precision precision_of(const ModelDescription& model, PrecisionMode wanted) {
   return wanted == PrecisionMode::int8 ? Precision::int8 : Precision::fp32;
 }
 
+/// What could be better about the precision; else empty.
+std::string remark_on_precision(const ModelDescription& model, const EngineOptions& choice,
+                                Precision precision) {
+  if (choice.precision == PrecisionMode::automatic && !model.int8)
+    return "int8 would be faster, but the model is not calibrated for it: 'stillmap model "
+           "calibrate' does it";
+  if (precision == Precision::int8 && model.int8->network_crc32.empty())
+    return "int8.yaml does not say with which model.onnx it was made: 'stillmap model calibrate' "
+           "makes one that does";
+  return {};
+}
+
 OpenedNetwork open_with_onednn(const ModelDescription& model, const EngineOptions& choice) {
   const Precision precision = precision_of(model, choice.precision);
-  const bool could_be_faster = choice.precision == PrecisionMode::automatic && !model.int8;
   auto network = std::make_unique<OneDnnNetwork>(model, precision, choice.threads);
   const int threads = network->threads();
   return {.network = std::move(network),
           .threads = threads,
-          .remark = could_be_faster
-                        ? "int8 would be faster, but the model is not calibrated for it: "
-                          "'stillmap model calibrate' does it"
-                        : ""};
+          .remark = remark_on_precision(model, choice, precision)};
 }
 
 OpenedNetwork open_with_opencv(const ModelDescription& model, const EngineOptions& choice,

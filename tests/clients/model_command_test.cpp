@@ -64,6 +64,17 @@ TEST_F(ModelCommandTest, CalibrationMakesInt8TheDefault) {
               HasSubstr("oneDNN fp32"));
 }
 
+TEST_F(ModelCommandTest, CalibrationOfAnotherTrainingIsRefused) {
+  calibrate();
+  std::ofstream(folder_ / "model/model.onnx", std::ios::binary | std::ios::app) << '\0';
+  const ProcessResult refused = model("info " + path("model"));
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("model/int8.yaml"), HasSubstr("network_crc32"),
+                                 HasSubstr("stillmap model calibrate")));
+  ASSERT_EQ(model("calibrate " + path("model") + " " + path("city")).exit_code, 0);
+  EXPECT_EQ(model("info " + path("model")).exit_code, 0);
+}
+
 TEST_F(ModelCommandTest, CalibrationThatNoStartWouldTakeIsNotWritten) {
   OnnxBuilder network(5, 0, 0);
   const std::vector<float> zeros(8 * 5, 0.0F);

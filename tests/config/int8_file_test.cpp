@@ -20,7 +20,9 @@ TEST(Int8File, ReadsBackWhatWasWritten) {
                             {"onnx::Add_123", {1e-7F}},
                             {"477", {12345.0F}},
                             {"null", {0.0F}}},
-      .float_layers = {"/head/Conv", "~"}};
+      .float_layers = {"/head/Conv", "~"},
+      // A number for YAML.
+      .network_crc32 = "00123e45"};
   const auto file = test::test_folder() / "int8.yaml";
   save_int8_calibration(written, file);
   const std::optional<Int8Calibration> read = load_int8_calibration(file);
@@ -28,6 +30,7 @@ TEST(Int8File, ReadsBackWhatWasWritten) {
   EXPECT_EQ(read->made, written.made);
   EXPECT_EQ(read->range_of_channels, written.range_of_channels);
   EXPECT_EQ(read->float_layers, written.float_layers);
+  EXPECT_EQ(read->network_crc32, written.network_crc32);
 }
 
 TEST(Int8File, NeedNotBeThere) {

@@ -100,6 +100,15 @@ TEST(ModelFile, ReadsItsCalibrationAndWhetherItFollowsTheSensor) {
   EXPECT_EQ(model.int8->range_of_channels.at("a"), (std::vector{2.0F, 3.0F}));
 }
 
+TEST(ModelFile, CalibrationsOfShippedModelsBelongToTheirNetworks) {
+  ASSERT_FALSE(known_models().empty());
+  for (const std::filesystem::path& folder : known_models()) {
+    const ModelDescription model = load_model_description(folder);
+    ASSERT_TRUE(model.int8.has_value()) << folder;
+    EXPECT_EQ(model.int8->network_crc32, crc32_of(model.network_file)) << folder;
+  }
+}
+
 TEST(ModelFile, ReadsWhatItWasTrainedFor) {
   EXPECT_FALSE(load_model(sound).trained_for.has_value());
   const std::string field =

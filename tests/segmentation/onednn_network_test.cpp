@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <limits>
 
 #include "core/segmentation/int8_calibration.hpp"
@@ -21,6 +22,7 @@ namespace {
 using test::OnnxBuilder;
 using test::random_image;
 using test::Window;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 constexpr int classes = 20;
@@ -237,6 +239,21 @@ TEST(OneDnnNetwork, RefusesADamagedCalibration) {
   EXPECT_THAT(zeros, HasSubstr("stillmap model calibrate"));
   EXPECT_THAT(refused_with([](auto& ranges) { ranges.pop_back(); }), HasSubstr("channels"));
   EXPECT_EQ(refused_with([](auto&) {}), "");
+}
+
+TEST(OneDnnNetwork, RefusesACalibrationOfAnotherNetworkOrOfLayersThatItDoesNotHave) {
+  ModelDescription model = written(test::light_bytes(8, 8, 32, classes), 8, 32);
+  model.int8 = calibrate(model, 1);
+  EXPECT_EQ(refusal(model, Precision::int8), "") << "of an older version";
+  model.int8->network_crc32 = crc32_of(model.network_file);
+  EXPECT_EQ(refusal(model, Precision::int8), "");
+  model.int8->float_layers = {"nonsense"};
+  EXPECT_THAT(refusal(model, Precision::int8), HasSubstr("float_layers: 'nonsense' is no layer"));
+  model.int8->float_layers.clear();
+  std::ofstream(model.network_file, std::ios::binary | std::ios::app) << '\0';
+  EXPECT_THAT(refusal(model, Precision::int8),
+              AllOf(HasSubstr("int8.yaml"), HasSubstr(crc32_of(model.network_file)),
+                    HasSubstr("stillmap model calibrate")));
 }
 
 TEST(OneDnnNetwork, SaysHowToCalibrateWhenThereIsNoCalibration) {

@@ -30,8 +30,10 @@ ModelDescription calibrated() {
                [&](const std::string& name, auto values, std::size_t channels) {
                  ranges.add(name, values, channels);
                });
-  model.int8 =
-      Int8Calibration{.made = "", .range_of_channels = ranges.ranges(1.0), .float_layers = {}};
+  model.int8 = Int8Calibration{.made = "",
+                               .range_of_channels = ranges.ranges(1.0),
+                               .float_layers = {},
+                               .network_crc32 = crc32_of(model.network_file)};
   return model;
 }
 
@@ -57,6 +59,10 @@ TEST(OpenNetwork, TakesTheFastestThatRunsTheModel) {
 TEST(OpenNetwork, RemarksWhyItIsNotFaster) {
   EXPECT_EQ(open_network(calibrated(), {}).remark, "");
   EXPECT_THAT(open_network(light_model(), {}).remark, HasSubstr("stillmap model calibrate"));
+  ModelDescription untold = calibrated();
+  untold.int8->network_crc32.clear();
+  EXPECT_THAT(open_network(untold, {}).remark, HasSubstr("does not say with which model.onnx"));
+  EXPECT_EQ(open_network(untold, {.precision = PrecisionMode::fp32}).remark, "");
   EXPECT_THAT(open_network(exotic(), {}).remark, HasSubstr("operator Sigmoid"));
   EXPECT_EQ(open_network(light_model(), {.precision = PrecisionMode::fp32}).remark, "");
 }

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 import yaml
 
-from adjust_prior import adjust, offsets
+from adjust_prior import adjust, crc32_of, offsets
 from model_folder import class_names, describe, export_onnx
 from networks import LightRangeNet, RangeNet
 from warm_start import check_description, load_weights
@@ -59,6 +59,17 @@ class WarmStart(unittest.TestCase):
             expected = network(images) - torch.from_numpy(change)[:, None, None]
             found = other.eval()(images)
         torch.testing.assert_close(found, expected, rtol=1e-3, atol=1e-3)
+
+    def test_an_adjusted_prior_takes_the_calibration_along(self):
+        source = self.exported(used(LightRangeNet(8, STAGES), 4))
+        adjusted = self.folder / "adjusted"
+        calibration = 'network_crc32: "{}"  # of model.onnx\nranges: {{}}\n'
+        (source / "int8.yaml").write_text(calibration.format(crc32_of(source / "model.onnx")))
+        for _ in range(2):
+            adjust(source, adjusted, np.ones(20, np.float32))
+            text = calibration.format(crc32_of(adjusted / "model.onnx"))
+            self.assertEqual((adjusted / "int8.yaml").read_text(), text)
+            source = adjusted
 
     def test_a_rare_class_loses_what_its_weight_gave(self):
         change = offsets([0.1, 0.6, 0.3, 0.001], "log", 0.5)

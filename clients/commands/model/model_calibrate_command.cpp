@@ -54,13 +54,15 @@ ActivationRanges observe_activations(const ModelArguments& arguments, const Mode
 
 /// Else every start would refuse the file.
 void require_usable(const Int8Calibration& calibration, const ModelDescription& model) {
-  const NetworkGraph graph = prepare_network(OnnxFile(model.network_file), model).graph;
-  const std::string fault = calibration_fault(graph, calibration);
+  const PreparedNetwork network = prepare_network(OnnxFile(model.network_file), model);
+  std::string fault = float_layer_fault(network.file_layers, calibration);
+  if (fault.empty()) fault = calibration_fault(network.graph, calibration);
   if (fault.empty()) return;
-  throw ModelError(model.network_file.parent_path() / "int8.yaml",
-                   "is not written: " + fault +
-                       "; calibrate with more --scans or other data sets, or use the model with "
-                       "precision: fp32");
+  throw ModelError(
+      model.network_file.parent_path() / "int8.yaml",
+      "is not written: " + fault +
+          "; calibrate with more --scans, other data sets or --float-layers, or use the model with "
+          "precision: fp32");
 }
 
 ExitCode run(const ModelCalibrateArguments& arguments) {
@@ -79,6 +81,7 @@ ExitCode run(const ModelCalibrateArguments& arguments) {
                      std::to_string(datasets.size()) + " data sets";
   calibration.range_of_channels = ranges.ranges(arguments.share);
   calibration.float_layers = arguments.float_layers;
+  calibration.network_crc32 = crc32_of(model.network_file);
   require_usable(calibration, fitted(arguments.model, model, datasets.front().suggested_sensor()));
   const std::filesystem::path file = model.network_file.parent_path() / "int8.yaml";
   save_int8_calibration(calibration, file);

@@ -46,6 +46,7 @@ double count_operations(const NetworkGraph& graph) {
 PreparedNetwork prepare_network(const OnnxFile& file, const ModelDescription& model) {
   PreparedNetwork network{.graph = read_network(file)};
   NetworkGraph& graph = network.graph;
+  for (const Layer& layer : graph.layers) network.file_layers.push_back(layer.name);
   const RowsColumns stride = network_stride(graph);
   require_multiple("rows", model.rows, stride.rows);
   require_multiple("columns", model.columns, stride.columns);

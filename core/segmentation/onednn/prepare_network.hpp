@@ -13,6 +13,8 @@ struct PreparedNetwork {
   bool had_softmax = false;
   /// Multiplications and additions per run, in 10^9, of the layers as they are in the file.
   double giga_operations = 0.0;
+  /// Names of the layers as they are in the file.
+  std::vector<std::string> file_layers = {};
 };
 
 /// Reads a network for images of the description's size, and reduces it to convolutions with

@@ -7,11 +7,13 @@ A loss that weighs rare classes more makes a network find them more often than t
 the road becomes parking. From the score of each class, `share` times the logarithm of its weight is
 subtracted (logit adjustment: Menon et al., ICLR 2021), in the bias of the last layer. The weights are
 those of --weights (see training.yaml) for the classes of --data. model.yaml is copied as it is, and
-so is int8.yaml: the last layer runs in floating point, and its input stays the same.
+so is int8.yaml, but for its network_crc32: the last layer runs in floating point, and its input stays
+the same.
 """
 
 import argparse
 import shutil
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +46,11 @@ def last_bias(graph):
     return next(tensor for tensor in graph.initializer if tensor.name == name)
 
 
+def crc32_of(file):
+    """As Stillmap writes it to int8.yaml."""
+    return f"{zlib.crc32(file.read_bytes()):08x}"
+
+
 def adjust(source, target, change):
     """Writes the model `source` to the folder `target`, with `change` subtracted from its scores."""
     network = onnx.load(str(source / "model.onnx"))
@@ -53,10 +60,16 @@ def adjust(source, target, change):
         raise SystemExit(f"{source}: has {values.size} classes, the training {change.size}")
     bias.CopyFrom(numpy_helper.from_array(values - change, bias.name))
     target.mkdir(parents=True, exist_ok=True)
+    crc32 = crc32_of(source / "model.onnx")
     onnx.save(network, str(target / "model.onnx"))
     for name in ("model.yaml", "int8.yaml"):
         if (source / name).exists() and source.resolve() != target.resolve():
             shutil.copy(source / name, target / name)
+    calibration = target / "int8.yaml"
+    if calibration.exists():
+        # It belongs to this network as it did to the other.
+        text = calibration.read_text()
+        calibration.write_text(text.replace(crc32, crc32_of(target / "model.onnx"), 1))
 
 
 def main():
