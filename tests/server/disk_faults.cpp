@@ -1,6 +1,7 @@
 // Preloaded into a server (LD_PRELOAD), makes its disk fail: as long as the file $STILLMAP_FAULT
 // holds "full", "read_only" or "fsync", calls fail on files in $STILLMAP_FAULT_FOLDER; with
-// "half_reset", no file there can be given the name city.stillmap.
+// "half_reset", no file there can be given the name city.stillmap; with "unreadable", what has that
+// name cannot be read.
 
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -36,12 +37,16 @@ bool is_watched(std::string_view path) {
   return folder != nullptr && path.starts_with(folder);
 }
 
-bool is_watched(int descriptor) {
+std::string name_of(int descriptor) {
   std::array<char, 4096> path{};
   const std::string link = "/proc/self/fd/" + std::to_string(descriptor);
   const ssize_t length = readlink(link.c_str(), path.data(), path.size());
-  return length > 0 && is_watched({path.data(), static_cast<size_t>(length)});
+  return {path.data(), static_cast<size_t>(length > 0 ? length : 0)};
 }
+
+bool is_watched(int descriptor) { return is_watched(name_of(descriptor)); }
+
+bool is_city(std::string_view path) { return is_watched(path) && path.ends_with("/city.stillmap"); }
 
 std::string fault() {
   const char* const control = std::getenv("STILLMAP_FAULT");
@@ -70,6 +75,12 @@ int failing(int error) {
 }  // namespace
 
 extern "C" {
+
+ssize_t pread64(int descriptor, void* bytes, size_t count, off64_t offset) {
+  static auto* const real = next<ssize_t(int, void*, size_t, off64_t)>("pread64");
+  if (is_city(name_of(descriptor)) && fault() == "unreadable") return failing(EIO);
+  return real(descriptor, bytes, count, offset);
+}
 
 ssize_t pwrite64(int descriptor, const void* bytes, size_t count, off64_t offset) {
   const int error = write_error(descriptor);
@@ -121,10 +132,7 @@ int open64(const char* path, int flags, ...) {
 int rename(const char* from, const char* to) noexcept {
   static auto* const real = next<int(const char*, const char*)>("rename");
   if (is_read_only(from)) return failing(EROFS);
-  if (std::string_view(to).ends_with("/city.stillmap") && is_watched(to) &&
-      fault() == "half_reset") {
-    return failing(EROFS);
-  }
+  if (is_city(to) && fault() == "half_reset") return failing(EROFS);
   return real(from, to);
 }
 

@@ -317,6 +317,17 @@ TEST_F(FaultyDisk, AResetThatFailsHalfWayIsUndoneAtTheEndWithoutAScan) {
   EXPECT_EQ(open_map_file(file_)->load().view.tiles.size(), 1U);
 }
 
+TEST_F(FaultyDisk, AFileThatCannotBeReadForAMomentIsNoOtherFile) {
+  OneVoxel running(file_);
+  running.saver().save_if_changed();
+  set_fault("unreadable");
+  EXPECT_THROW(running.saver().save_if_changed(), MapFileError);
+  EXPECT_THROW(running.saver().save_as(""), MapFileError);
+  set_fault("");
+  EXPECT_EQ(running.saver().save_as(""), file_);
+  EXPECT_EQ(running.tiles().load({0, 0}).tile->voxels.size(), 1U);
+}
+
 class MapSaverFaults : public FaultyDisk, public testing::WithParamInterface<SaverFault> {
  protected:
   void wait_up_to(unsigned max_us) { usleep(static_cast<useconds_t>(random_() % max_us)); }

@@ -163,6 +163,7 @@ void create(const fs::path& file) {
     database.exec(schema);
     database.exec(evidence_table);
     database.exec(tile_info_index);
+    begin_save_marks(database);
     transaction.commit();
     database.exec("PRAGMA journal_mode = WAL");
   }

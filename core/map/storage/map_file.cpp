@@ -137,8 +137,7 @@ class SqliteMapStore : public MapStore {
   std::uint64_t save(const SavedMap& map) override {
     std::uint64_t log_bytes = 0;
     writing([&] {
-      if (has_first_schema(database_)) upgrade_schema(database_);
-      index_tile_infos(database_);
+      bring_tables_up_to_date();
       read_what_is_saved();
       empty_log_before();
       if (!saved_tiles_) saved_tiles_ = read_tile_infos(database_);
@@ -169,10 +168,7 @@ class SqliteMapStore : public MapStore {
   }
 
   SavedMap load_non_resident() override {
-    writing([this] {
-      if (has_first_schema(database_)) upgrade_schema(database_);
-      index_tile_infos(database_);
-    });
+    writing([this] { bring_tables_up_to_date(); });
     return reading([this] {
       SavedMap map{read_map_row(database_), read_hidden_tile_ids(database_),
                    read_trajectory(database_), read_metadata(database_)};
@@ -263,6 +259,12 @@ class SqliteMapStore : public MapStore {
   }
 
  private:
+  void bring_tables_up_to_date() {
+    if (has_first_schema(database_)) upgrade_schema(database_);
+    index_tile_infos(database_);
+    log_is_empty_ &= watch_.has_empty_log();
+  }
+
   void back_up_to(const fs::path& fresh) {
     SQLite::Database target(sqlite_name(fresh), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
     const int result = SQLite::Backup(target, database_).executeStep(-1);
@@ -342,7 +344,7 @@ class SqliteMapStore : public MapStore {
     refuse_overwritten();
   }
   void refuse_overwritten() const {
-    if (!is_overwritten_) return;
+    if (!is_overwritten_ && !watch_.is_others()) return;
     throw SQLite::Exception("another program wrote to the file", SQLITE_CORRUPT);
   }
 
@@ -351,6 +353,8 @@ class SqliteMapStore : public MapStore {
     if (log_is_empty_) return;
     check_fate();
     empty_log("PASSIVE");
+    // What has no mark of its own, as an upgrade, is in the file by now.
+    watch_.remember(database_);
   }
 
   /// Brings the log's content into the file, unless somebody reads what it still has without it.
@@ -408,6 +412,7 @@ class SqliteMapStore : public MapStore {
     const std::int64_t version = database_.execAndGet("PRAGMA data_version").getInt64();
     if (version == data_version_) return;
     follow_others(version);
+    refuse_overwritten();
     saved_trajectory_.reset();
     saved_tiles_.reset();
   }

@@ -1,6 +1,7 @@
 #include "core/map/storage/map_file_watch.hpp"
 
 #include <SQLiteCpp/Exception.h>
+#include <SQLiteCpp/Transaction.h>
 #include <fcntl.h>
 #include <sqlite3.h>
 #include <unistd.h>
@@ -11,7 +12,6 @@
 #include <utility>
 
 #include "core/map/storage/map_database.hpp"
-#include "core/map/storage/save_marks.hpp"
 
 namespace stillmap {
 namespace {
@@ -34,13 +34,14 @@ bool has_moved(SQLite::Database& database) {
   return result == SQLITE_OK && moved != 0;
 }
 
+MapFileError not_visible(const fs::path& file, const std::string& why) {
+  return {file, "cannot be looked at (" + why + "); nothing is written to it until it can"};
+}
+
 /// Throws MapFileError for a fault: an I/O error, a network that is away.
 std::optional<FileState> checked(const fs::path& file, const std::optional<FileState>& state,
                                  const std::error_code& fault) {
-  if (fault) {
-    throw MapFileError(file, "cannot be looked at (" + fault.message() +
-                                 "); nothing is written to it until it can");
-  }
+  if (fault) throw not_visible(file, fault.message());
   return state;
 }
 
@@ -79,54 +80,77 @@ MapFileWatch::MapFileWatch(fs::path file, SQLite::Database& database)
 
 void MapFileWatch::remember(SQLite::Database& database) {
   try {
-    marks_ = save_marks(database);
-    data_version_ = data_version(database);
+    look(database);
   } catch (const SQLite::Exception&) {
     // A failing disk; who reads or writes next says so.
-    marks_.reset();
+    is_behind_ = true;
   }
   if (!log_) log_ = FileState::of(beside(file_, "-wal"));
   if (!log_index_) log_index_ = FileState::of(beside(file_, "-shm"));
+}
+
+void MapFileWatch::look(SQLite::Database& database) {
+  const SQLite::Transaction one_state(database);
+  Known now{.marks = save_marks(database),
+            .shape = shape_of(database),
+            .data_version = data_version(database)};
+  if (known_ && (is_behind_ || now.data_version != known_->data_version)) {
+    is_others_ |= known_->marks.empty()
+                      ? !now.marks.empty()
+                      : std::ranges::find(now.marks, known_->marks.back()) == now.marks.end();
+  }
+  known_ = std::move(now);
+  is_behind_ = false;
 }
 
 MapFileFate MapFileWatch::fate(SQLite::Database& database) {
   if (!state_of_name(file_)) return MapFileFate::removed;
   if (!has_own_name()) return MapFileFate::replaced;
   try {
-    // Another connection has saved there.
-    if (data_version(database) != data_version_) {
-      remember(database);
+    // Another connection has written there.
+    if (!known_ || is_behind_ || data_version(database) != known_->data_version) {
+      look(database);
       is_partly_written_ |= !has_empty_log();
     }
-  } catch (const SQLite::Exception&) {
-    return MapFileFate::overwritten;
+    if (is_others_) return MapFileFate::overwritten;
+    return is_own_content(has_empty_log()) ? MapFileFate::kept : MapFileFate::overwritten;
+  } catch (const SQLite::Exception& error) {
+    if (is_of_content(error)) return MapFileFate::overwritten;
+    throw not_visible(file_, error.what());
   }
-  return is_own_content(has_empty_log()) ? MapFileFate::kept : MapFileFate::overwritten;
 }
 
 bool MapFileWatch::has_own_name() const {
+  std::error_code ignored;
+  if (fs::is_symlink(fs::symlink_status(file_, ignored))) return false;
   return !was_moved_ && is_same_file(state_of_name(file_), opened_.state());
 }
 
 bool MapFileWatch::is_same_under_name() const {
-  if (!marks_ || marks_->empty() || !has_empty_log()) return false;
-  const LastMark last = last_mark_without_log(file_);
-  return last.is_readable && last.mark == marks_->back();
+  if (!known_ || is_behind_ || is_others_ || known_->marks.empty() || !has_empty_log())
+    return false;
+  try {
+    const LastMark last = last_mark_without_log(file_);
+    return last.is_readable && last.mark == known_->marks.back() && last.shape == known_->shape;
+  } catch (const SQLite::Exception& error) {
+    throw not_visible(file_, error.what());
+  }
 }
 
 bool MapFileWatch::is_own_content(bool is_alone) const {
-  if (!marks_) return true;
+  if (!known_) return true;
+  const std::vector<std::int64_t>& marks = known_->marks;
   const LastMark last = last_mark_without_log(file_);
   if (is_alone) {
-    const auto own = marks_->empty() ? std::nullopt : std::make_optional(marks_->back());
-    const bool is_last = last.is_readable && last.mark == own;
+    const auto own = marks.empty() ? std::nullopt : std::make_optional(marks.back());
+    const bool is_last = last.is_readable && last.mark == own && last.shape == known_->shape;
     had_mark_ |= is_last && own.has_value();
     return is_last;
   }
   // While somebody reads, a log may be written into the file in parts.
   if (!last.is_readable) return is_partly_written_;
   if (!last.mark) return !had_mark_;
-  const bool is_own = std::ranges::find(*marks_, *last.mark) != marks_->end();
+  const bool is_own = std::ranges::find(marks, *last.mark) != marks.end();
   had_mark_ |= is_own;
   return is_own;
 }

@@ -10,6 +10,7 @@
 
 #include "core/map/storage/map_file.hpp"
 #include "core/map/storage/read_lease.hpp"
+#include "core/map/storage/save_marks.hpp"
 
 namespace stillmap {
 
@@ -42,25 +43,40 @@ class MapFileWatch {
   /// Of a file that this connection has just opened.
   MapFileWatch(std::filesystem::path file, SQLite::Database& database);
 
-  /// After every write of the connection, also one that failed.
+  /// After every write of the connection, also one that failed, and after one of another
+  /// connection.
   void remember(SQLite::Database& database);
   /// Throws MapFileError where the file cannot be looked at: that says nothing of its fate.
   [[nodiscard]] MapFileFate fate(SQLite::Database& database);
+  /// What others wrote does not go on from what the connection saved last: file and log were
+  /// written over together.
+  [[nodiscard]] bool is_others() const { return is_others_; }
   /// Whether another file has the name, in the very state that the connection left its own in.
+  /// Throws as `fate`.
   [[nodiscard]] bool is_same_under_name() const;
   /// Around every writing of the log into the file: one that was not finished leaves it unreadable
   /// without the log.
   void set_partly_written(bool is_partly_written) { is_partly_written_ = is_partly_written; }
-  /// Whether the name is still that of the file that was opened. Throws as `fate`.
+  /// Whether the name is still that of the file that was opened, and no link to it: beside that,
+  /// others look for its log and its lock. Throws as `fate`.
   [[nodiscard]] bool has_own_name() const;
   /// Whether the file alone is what the connection left of it. It must be readable unless a log was
-  /// written into it in part.
+  /// written into it in part. Throws SQLite::Exception for a fault of the disk.
   [[nodiscard]] bool is_own_content(bool is_alone) const;
   /// Removes the log's files that this connection made or found, unless others have their names.
   [[nodiscard]] std::function<void()> log_removal() const;
+  [[nodiscard]] bool has_empty_log() const;
 
  private:
-  [[nodiscard]] bool has_empty_log() const;
+  struct Known {
+    /// One of those is the file's last one.
+    std::vector<std::int64_t> marks;
+    DatabaseShape shape;
+    /// SQLite's, when the marks were read.
+    std::int64_t data_version = -1;
+  };
+  /// Throws SQLite::Exception.
+  void look(SQLite::Database& database);
 
   std::filesystem::path file_;
   FileReference opened_;
@@ -72,10 +88,11 @@ class MapFileWatch {
   mutable bool had_mark_ = false;
   std::optional<FileState> log_;
   std::optional<FileState> log_index_;
-  /// One of those is the file's last one; nothing where they could not be read.
-  std::optional<std::vector<std::int64_t>> marks_;
-  /// SQLite's, when the marks were read.
-  std::int64_t data_version_ = -1;
+  /// Nothing where it could not be read yet.
+  std::optional<Known> known_;
+  /// It could not be read after the last write.
+  bool is_behind_ = false;
+  bool is_others_ = false;
 };
 
 }  // namespace stillmap

@@ -12,6 +12,7 @@
 #include "core/map/storage/map_database.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/map/storage/map_tables.hpp"
+#include "core/map/storage/save_marks.hpp"
 #include "core/map/storage/session_tables.hpp"
 #include "core/map/storage/tile_codec.hpp"
 
@@ -138,6 +139,7 @@ void write_first_session(const fs::path& file, const std::string& source) {
     if (path.empty()) return;
     SQLite::Transaction transaction(database);
     write_first_row(database, path, source);
+    add_save_mark(database, false);
     transaction.commit();
   });
 }
@@ -165,6 +167,7 @@ void withdraw_newest_session(const fs::path& file, const fs::path& out) {
     for (const char* rows :
          {"session_tiles WHERE session", "session_metadata WHERE session", "sessions WHERE number"})
       run_for(database, std::string("DELETE FROM ") + rows + " = ?", newest.number);
+    begin_save_marks(database);
     transaction.commit();
     database.exec("VACUUM");
   });

@@ -27,10 +27,14 @@ std::int64_t random_mark() {
   return static_cast<std::int64_t>(entropy()) << 32 | entropy();
 }
 
+bool is_sound(SQLite::Database& database) {
+  return database.execAndGet("PRAGMA quick_check(1)").getString() == "ok";
+}
+
 bool is_sound_without_log(const fs::path& file) {
   try {
     SQLite::Database alone(uri_without_log(file), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
-    return alone.execAndGet("PRAGMA quick_check(1)").getString() == "ok";
+    return is_sound(alone);
   } catch (const SQLite::Exception&) {
     return false;
   }
@@ -49,7 +53,10 @@ bool is_log_of(const fs::path& file) {
     const auto last = last_mark_without_log(file).mark;
     if (!last) return true;
     const std::vector<std::int64_t> with_log = save_marks(database);
-    return std::ranges::find(with_log, *last) != with_log.end();
+    if (std::ranges::find(with_log, *last) == with_log.end()) return false;
+    // The file has the newest mark where a crash came while the log was written into it, and also
+    // where the log is another file's, which had its marks in another page.
+    return with_log.back() != *last || is_sound(database) || !is_sound_without_log(file);
   } catch (const SQLite::Exception& error) {
     const bool is_damaged =
         error.getErrorCode() == SQLITE_CORRUPT || error.getErrorCode() == SQLITE_NOTADB;
@@ -57,16 +64,28 @@ bool is_log_of(const fs::path& file) {
   }
 }
 
-}  // namespace
-
-void add_save_mark(SQLite::Database& database, bool log_was_empty) {
-  database.exec("CREATE TABLE IF NOT EXISTS saves (mark INTEGER NOT NULL)");
-  if (log_was_empty) {
-    database.exec("DELETE FROM saves WHERE rowid < (SELECT max(rowid) FROM saves)");
-  }
+void insert_mark(SQLite::Database& database) {
   SQLite::Statement insert(database, "INSERT INTO saves VALUES (?)");
   insert.bind(1, random_mark());
   insert.exec();
+}
+
+constexpr const char* marks_table = "CREATE TABLE IF NOT EXISTS saves (mark INTEGER NOT NULL)";
+
+}  // namespace
+
+void add_save_mark(SQLite::Database& database, bool log_was_empty) {
+  database.exec(marks_table);
+  if (log_was_empty) {
+    database.exec("DELETE FROM saves WHERE rowid < (SELECT max(rowid) FROM saves)");
+  }
+  insert_mark(database);
+}
+
+void begin_save_marks(SQLite::Database& database) {
+  database.exec(marks_table);
+  database.exec("DELETE FROM saves");
+  insert_mark(database);
 }
 
 std::vector<std::int64_t> save_marks(SQLite::Database& database) {
@@ -77,14 +96,45 @@ std::vector<std::int64_t> save_marks(SQLite::Database& database) {
   return all;
 }
 
+DatabaseShape shape_of(SQLite::Database& database) {
+  return {.pages = database.execAndGet("PRAGMA page_count").getInt64(),
+          .schema = database.execAndGet("PRAGMA schema_version").getInt64()};
+}
+
 LastMark last_mark_without_log(const fs::path& file) {
+  // To open a pipe is to wait for who writes into it.
+  std::error_code not_there;
+  if (fs::exists(file, not_there) && !fs::is_regular_file(file, not_there)) return {};
   try {
     SQLite::Database alone(uri_without_log(file), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
     const std::vector<std::int64_t> all = save_marks(alone);
     return {.is_readable = true,
-            .mark = all.empty() ? std::nullopt : std::make_optional(all.back())};
-  } catch (const SQLite::Exception&) {
+            .mark = all.empty() ? std::nullopt : std::make_optional(all.back()),
+            .shape = shape_of(alone)};
+  } catch (const SQLite::Exception& error) {
+    if (!is_of_content(error)) throw;
     return {};
+  }
+}
+
+bool is_of_content(const SQLite::Exception& error) {
+  constexpr int primary_code = 0xFF;
+  switch (error.getErrorCode() & primary_code) {
+    case SQLITE_IOERR:
+    case SQLITE_CANTOPEN:
+    case SQLITE_NOMEM:
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+    case SQLITE_PROTOCOL:
+    case SQLITE_PERM:
+    case SQLITE_AUTH:
+    case SQLITE_READONLY:
+    case SQLITE_FULL:
+    case SQLITE_NOLFS:
+    case SQLITE_INTERRUPT:
+      return false;
+    default:
+      return true;
   }
 }
 

@@ -17,8 +17,20 @@ namespace stillmap {
 /// file itself, so that marks before the last one are no longer needed.
 void add_save_mark(SQLite::Database& database, bool log_was_empty);
 
+/// Within the transaction that makes a map, or another one of a copy, which is no later state of
+/// its original: a mark alone, without those of the original.
+void begin_save_marks(SQLite::Database& database);
+
 /// In the order of the saves; none in a file that was saved before there were marks.
 [[nodiscard]] std::vector<std::int64_t> save_marks(SQLite::Database& database);
+
+/// Differs where a database was made anew by what leaves no mark: VACUUM, an older version's tools.
+struct DatabaseShape {
+  std::int64_t pages = 0;
+  std::int64_t schema = 0;
+  friend bool operator==(const DatabaseShape&, const DatabaseShape&) = default;
+};
+[[nodiscard]] DatabaseShape shape_of(SQLite::Database& database);
 
 /// What a file holds of its own, without its log.
 struct LastMark {
@@ -27,8 +39,13 @@ struct LastMark {
   bool is_readable = false;
   /// Nothing in one that was saved before there were marks.
   std::optional<std::int64_t> mark;
+  DatabaseShape shape;
 };
+/// Throws SQLite::Exception for a fault of the disk, which says nothing of the content.
 [[nodiscard]] LastMark last_mark_without_log(const std::filesystem::path& file);
+
+/// Whether the error is one of what the file holds: of reading, writing or memory otherwise.
+[[nodiscard]] bool is_of_content(const SQLite::Exception& error);
 
 /// Renames a log that is not this file's, so that the file is opened as it is alone; its name then
 /// ends in "-wal.other". Does nothing where a process has the file open. Throws
