@@ -226,7 +226,8 @@ class Client {
   LoadedMap load_map(const std::string& file);
 
   /// Has the server start an empty map and trajectory. The map until then is kept in a file beside
-  /// the server's map file, unless `discard`.
+  /// the server's map file, unless `discard`; without a map file, one that was never saved by name
+  /// is refused (ServiceError).
   BegunMap reset(bool discard = false);
 
   /// Calls back for every pose. Each subscription has its own thread, and its calls never overlap;

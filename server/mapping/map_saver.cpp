@@ -303,7 +303,7 @@ void MapSaver::save_copy(const fs::path& target, bool overwrite) {
 void MapSaver::refuse_to_lose() const {
   if (!file_.empty() || is_empty() || copied_map_id_ == latest_map_.view()->map_id) return;
   throw RefusedNow(
-      "this server keeps its map in no file, and a load would lose it: 'stillmap save NAME' first "
+      "this server keeps its map in no file, and it would be lost: 'stillmap save NAME' first "
       "('stillmap reset --discard' where it is not wanted)");
 }
 
@@ -355,6 +355,7 @@ NewMap MapSaver::begin_anew(bool discard, const BeginMap& begin) {
   NewMap begun{.map_id = new_map_id(), .kept_file = {}};
   std::shared_ptr<MovableTileStore> tiles;
   look_after_file_first();
+  if (!discard) refuse_to_lose();
   if (!file_.empty()) {
     if (!discard && !is_empty() && !is_saved_whole()) save(CheckpointScope::changed);
     if (open_store().holds_map()) {

@@ -175,7 +175,8 @@ class MapSaver {
   std::filesystem::path resume_from(const std::string& name, const PrepareMap& prepare);
 
   /// Lets an empty map begin. The running map is saved, and kept beside the current file, which is
-  /// the new map's; with `discard`, it is gone. Throws as save_as; then the running map goes on.
+  /// the new map's; with `discard`, it is gone. Throws as save_as, and RefusedNow for a running map
+  /// that has no file and was never saved, unless `discard`; then the running map goes on.
   NewMap begin_anew(bool discard, const BeginMap& begin);
 
  private:

@@ -333,5 +333,16 @@ TEST_F(MapSaverSafetyTest, SaysWhyANameIsNone) {
   }
 }
 
+TEST_F(MapSaverSafetyTest, AMapWithoutAFileIsNotLostByAReset) {
+  MapSaver saver(latest_map_, statistics_, "", {});
+  saver.set_source(source_);
+  saver.begin_anew(false, begin_);
+  map_scan(5.0F);
+  EXPECT_THAT(why_refused([&] { saver.begin_anew(false, begin_); }), HasSubstr("save NAME"));
+  EXPECT_EQ(latest_map_.view()->tiles.size(), 1U);
+  saver.begin_anew(true, begin_);
+  EXPECT_TRUE(latest_map_.view()->tiles.empty());
+}
+
 }  // namespace
 }  // namespace stillmap::server

@@ -44,6 +44,7 @@ TEST(NoMapFile, ALoadDoesNotCostTheRunningMap) {
   drive(publisher, 4, 8);
   ASSERT_TRUE(wait_for_scans(client, 8));
   EXPECT_THAT(refusal("first.stillmap"), testing::HasSubstr("stillmap save NAME"));
+  EXPECT_THROW(client.reset(), ServiceError);
   EXPECT_EQ(open_map_file(client.save_map("second.stillmap"))->load().trajectory.size(), 4U);
   EXPECT_THAT(refusal("third.stillmap"), testing::HasSubstr("in the folder " + folder.string()));
   EXPECT_EQ(client.load_map("first.stillmap").pose_count, 4U);

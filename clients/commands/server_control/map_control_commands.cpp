@@ -122,7 +122,7 @@ void add_reset_command(CommandHandle program, Action& action) {
       "  stillmap reset --json | jq -r .kept_file\n"
       "The map until now is saved, and its file renamed: city.stillmap is kept beside it as\n"
       "city.2026-05-31_142500.stillmap, to return to with 'stillmap load'. A server without a map\n"
-      "file keeps nothing.");
+      "file keeps nothing: it refuses unless its map was saved by name, or with --discard.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
