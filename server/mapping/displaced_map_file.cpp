@@ -19,6 +19,8 @@ constexpr const char* counter = "map_files_displaced";
 
 std::string words_of(MapFileFate fate) {
   switch (fate) {
+    case MapFileFate::kept:
+      return "is written to by another process, since its lock was removed";
     case MapFileFate::removed:
       return "was removed while this server has it open";
     case MapFileFate::replaced:
@@ -48,12 +50,8 @@ void MapSaver::look_after_file_first() {
 void MapSaver::look_after_file() {
   if (!store_ || file_.empty()) return;
   const MapFileFate fate = store_->fate();
-  if (fate == MapFileFate::kept) return;
-  if (fate == MapFileFate::replaced && store_->is_same_under_name()) {
-    leave_store_for(file_);
-    static_cast<void>(open_store());
-    return;
-  }
+  if (fate == MapFileFate::kept && keep_lock()) return tell_where_name_leads();
+  if (fate == MapFileFate::replaced && follow_name()) return;
   const auto began = std::chrono::steady_clock::now();
   const MapFileError displaced(file_, words_of(fate));
   throttled_log_.error("displaced",
@@ -72,30 +70,89 @@ void MapSaver::look_after_file() {
   spdlog::warn("the running map goes on in {}", file_.string());
   if (left_file_) {
     statistics_.set_map_displaced(left_file_->string() +
-                                  ": is not the running map's file any more; that goes on in " +
+                                  " is not the running map's file any more; that is saved to " +
                                   file_.string() + " until another map is loaded");
   }
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
   // What is in memory alone is still to be saved.
-  if (saved_map_id_ != 0) statistics_.map_saved(took.count());
+  if (saved_map_id_ != 0 || is_empty()) statistics_.map_saved(took.count());
+}
+
+bool MapSaver::keep_lock() {
+  if (lock_->is_held()) return true;
+  try {
+    lock_ = std::make_unique<MapLock>(file_);
+    spdlog::warn("the lock of {} was removed, and is there again", file_.string());
+  } catch (const MapFileInUseError&) {
+    return false;
+  } catch (const MapFileError& error) {
+    throttled_log_.error("lock",
+                         std::string(error.what()) +
+                             "; its lock was removed, and another server may be started on it");
+  }
+  return true;
+}
+
+void MapSaver::tell_where_name_leads() {
+  if (left_file_ || file_ != configured_file_) return;
+  std::string elsewhere;
+  try {
+    const fs::path there = real_file(configured_name_);
+    if (there != file_) elsewhere = "leads to " + there.string();
+  } catch (const MapFileError& error) {
+    elsewhere = std::string("leads nowhere (") + error.what() + ")";
+  }
+  if (!elsewhere.empty()) {
+    elsewhere = configured_name_.string() + " " + elsewhere +
+                " by now; the running map is saved to " + file_.string() +
+                ", and the next start does not resume it";
+  }
+  statistics_.set_map_displaced(elsewhere);
+}
+
+void MapSaver::move_to(const fs::path& target, std::unique_ptr<MapLock> target_lock) {
+  const bool is_configured = file_ == configured_file_;
+  leave_store_for(target);
+  if (is_configured) configured_file_ = target;
+  if (target_lock) lock_ = std::move(target_lock);
+}
+
+bool MapSaver::follow_name() {
+  if (!store_->is_same_under_name()) return false;
+  const fs::path target = real_file(file_);
+  std::unique_ptr<MapLock> target_lock;
+  try {
+    if (target != file_) target_lock = std::make_unique<MapLock>(target);
+  } catch (const MapFileError& error) {
+    throttled_log_.error("lock", error.what());
+    return false;
+  }
+  if (target != file_) spdlog::warn("{} leads to {} by now", file_.string(), target.string());
+  move_to(target, std::move(target_lock));
+  static_cast<void>(open_store());
+  return true;
 }
 
 bool MapSaver::take_name_again() {
   try {
-    if (!lock_->is_held()) lock_ = std::make_unique<MapLock>(file_);
-  } catch (const MapFileInUseError&) {
-    // Another server's by now.
+    // A link may have the name, also one to another disk.
+    const fs::path target = real_file(file_);
+    std::unique_ptr<MapLock> target_lock;
+    if (target != file_ || !lock_->is_held()) target_lock = std::make_unique<MapLock>(target);
+    if (!store_->copy_to_new(target)) return false;
+    move_to(target, std::move(target_lock));
+    return true;
+  } catch (const MapFileError& error) {
+    // Another server's by now, or where it leads to cannot be written.
+    throttled_log_.error("name", error.what());
     return false;
   }
-  return store_->copy_to_new(file_);
 }
 
 bool MapSaver::write_anew(MapFileFate fate) {
-  if (fate == MapFileFate::removed && take_name_again()) {
-    leave_store_for(file_);
-  } else {
+  if (fate != MapFileFate::removed || !take_name_again()) {
     // It may have been away for a moment.
-    if (store_->fate() == MapFileFate::kept) return false;
+    if (fate != MapFileFate::kept && store_->fate() == MapFileFate::kept) return false;
     const fs::path target = name_beside();
     auto target_lock = std::make_unique<MapLock>(target);
     if (!store_->copy_to_new(target)) throw MapFileError(target, "was made by somebody just now");
@@ -118,6 +175,12 @@ fs::path MapSaver::name_beside() const {
 void MapSaver::leave_name() {
   if (!left_file_) left_file_ = file_;
   is_left_file_loaded_ = true;
+}
+
+void MapSaver::remove_if_empty(const fs::path& made_beside) {
+  if (!left_file_ || !store_ || store_->fate() != MapFileFate::kept || store_->holds_map()) return;
+  std::error_code ignored;
+  fs::remove(made_beside, ignored);
 }
 
 void MapSaver::write_anew_from_memory() {

@@ -52,6 +52,8 @@ MapSaver::MapSaver(const LatestMap& latest_map, Statistics& statistics, const fs
     : latest_map_(latest_map),
       statistics_(statistics),
       file_(file.empty() ? file : real_file(file)),
+      configured_name_(file.empty() ? file : fs::absolute(file)),
+      configured_file_(file_),
       folder_(file_, limits.saved_maps),
       metadata_(std::move(metadata)),
       memory_limit_bytes_(std::size_t{limits.memory_limit_mib} << 20),
@@ -141,6 +143,7 @@ void MapSaver::save_at_end() {
   // Nothing mapped: an empty map must not replace what the file holds.
   const bool is_map_empty = latest_map_.poses_added() == 0 && latest_map_.view()->tiles.empty();
   if (!file_.empty() && !(is_map_empty && is_saved())) save(CheckpointScope::changed, true);
+  remove_if_empty(file_);
 }
 
 void MapSaver::make_room() {
@@ -254,10 +257,6 @@ fs::path MapSaver::file_named(const std::string& name) const {
   return name.empty() ? file_ : real_file(folder_.file_named(name));
 }
 
-bool MapSaver::is_empty() const {
-  return latest_map_.view()->tiles.empty() && latest_map_.poses_stored() == 0;
-}
-
 fs::path MapSaver::save_as(const std::string& name, bool overwrite) {
   const std::scoped_lock lock(mutex_);
   look_after_file_first();
@@ -328,7 +327,9 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
     save(CheckpointScope::changed);
   }
   // The last step that can fail.
+  const auto began = std::chrono::steady_clock::now();
   source.begin_run(map.view.map_id, session_);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
   begin();
   tiles_ = tiles;
   is_session_ = true;
@@ -336,12 +337,14 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
   if (!is_own) {
     // The datum of another map is that in its own file.
     metadata_.erase("datum");
+    if (!file_.empty()) remove_if_empty(file_);
     file_ = target;
     store_ = std::move(store);
     lock_ = std::move(target_lock);
+    left_file_.reset();
+    statistics_.set_map_displaced({});
   }
-  left_file_.reset();
-  statistics_.set_map_displaced({});
+  statistics_.map_saved(took.count());
   lost_tiles_.clear();
   is_memory_alone_ = false;
   remember_metadata(map);

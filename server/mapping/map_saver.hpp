@@ -193,8 +193,19 @@ class MapSaver {
   /// The name that a map gets which cannot have its own. Throws MapFileError beyond the limit of
   /// saved maps, unless the run has ended.
   [[nodiscard]] std::filesystem::path name_beside() const;
-  /// False where the name is another file's, or another server's.
+  /// False where the name is another file's, or another server's, or cannot be written.
   [[nodiscard]] bool take_name_again();
+  /// Of a file that is kept: takes its lock again where somebody removed it. False where another
+  /// process has it.
+  [[nodiscard]] bool keep_lock();
+  /// Tells of a configured link that leads to another file by now.
+  void tell_where_name_leads();
+  /// Goes on in the file itself, or a copy of its last state, that has the name, or that a link of
+  /// that name leads to. False where neither is there.
+  [[nodiscard]] bool follow_name();
+  void move_to(const std::filesystem::path& target, std::unique_ptr<MapLock> target_lock);
+  /// A file that was made beside the map's name, and never got anything to hold.
+  void remove_if_empty(const std::filesystem::path& made_beside);
   /// Tiles that were in the file alone are lost with its content.
   void write_anew_from_memory();
   /// The next file to be opened is `target`; the one that was open is somebody else's.
@@ -220,7 +231,11 @@ class MapSaver {
   /// RefusedNow where there is no current file.
   [[nodiscard]] std::filesystem::path file_named(const std::string& name) const;
   void save_copy(const std::filesystem::path& target, bool overwrite);
-  [[nodiscard]] bool is_empty() const;
+  [[nodiscard]] bool is_empty() const {
+    // There is no view before mapping begins.
+    const auto view = latest_map_.view();
+    return (!view || view->tiles.empty()) && latest_map_.poses_stored() == 0;
+  }
   /// Renames the current file, and puts an empty one in its place, whose tiles it returns. Throws
   /// MapFileError; then the current file is what it was, or becomes it again with the next use that
   /// the disk allows.
@@ -236,6 +251,9 @@ class MapSaver {
   const LatestMap& latest_map_;
   Statistics& statistics_;
   std::filesystem::path file_;
+  /// As it was configured, which may be a link, and the file that it is taken to lead to.
+  std::filesystem::path configured_name_;
+  std::filesystem::path configured_file_;
   MapFolder folder_;
   std::unique_ptr<MapLock> lock_;
   std::map<std::string, std::string> metadata_;

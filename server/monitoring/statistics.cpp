@@ -222,7 +222,12 @@ std::string Statistics::last_drop() const {
 
 std::string Statistics::last_save_failure() const {
   const std::scoped_lock lock(mutex_);
-  return last_save_failure_.empty() ? map_displaced_ : last_save_failure_;
+  return last_save_failure_;
+}
+
+std::string Statistics::map_displaced() const {
+  const std::scoped_lock lock(mutex_);
+  return map_displaced_;
 }
 
 std::string Statistics::last_segmentation_failure() const {

@@ -82,9 +82,9 @@ class Statistics {
   [[nodiscard]] std::chrono::steady_clock::time_point started() const { return started_; }
   /// Why the last scan was dropped; empty once a later one was mapped.
   [[nodiscard]] std::string last_drop() const;
-  /// Why the last save of the map failed, or what is wrong with where the map is saved; empty once
-  /// a later one succeeded where it should.
+  /// Why the last save of the map failed; empty once a later one succeeded.
   [[nodiscard]] std::string last_save_failure() const;
+  [[nodiscard]] std::string map_displaced() const;
   [[nodiscard]] std::string place_search() const;
   /// Why the last segmentation failed; empty once a later one worked.
   [[nodiscard]] std::string last_segmentation_failure() const;

@@ -146,6 +146,12 @@ std::string ServerReport::reason(const dds::ServerStatus& status) const {
   if (const std::string failure = statistics_.last_save_failure(); !failure.empty()) {
     return "the map cannot be saved, what is mapped is in memory alone: " + failure;
   }
+  const std::string fault = mapping_fault(status);
+  const std::string displaced = statistics_.map_displaced();
+  return fault.empty() || displaced.empty() ? fault + displaced : fault + "; " + displaced;
+}
+
+std::string ServerReport::mapping_fault(const dds::ServerStatus& status) const {
   if (const std::string why = no_input_reason_(); !why.empty()) return why;
   if (const std::string drop = statistics_.last_drop(); !drop.empty()) {
     return "the last scan was dropped: " + drop;

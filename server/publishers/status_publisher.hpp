@@ -64,6 +64,8 @@ class ServerReport {
 
  private:
   [[nodiscard]] std::string reason(const dds::ServerStatus& status) const;
+  /// What keeps scans from being mapped as they should.
+  [[nodiscard]] std::string mapping_fault(const dds::ServerStatus& status) const;
 
   ServerTraits traits_;
   std::string host_;

@@ -189,9 +189,12 @@ TEST_F(DisplacedMapFile, TheStatusSaysSoUntilTheOperatorLoads) {
   const fs::path saved = saver_.save_as("");
   map_scan(50.0F);
   saver_.save_if_changed();
-  EXPECT_THAT(statistics_.last_save_failure(), HasSubstr("goes on in " + saved.string()));
+  EXPECT_EQ(statistics_.last_save_failure(), "") << "it is saved";
+  EXPECT_THAT(statistics_.map_displaced(), HasSubstr("saved to " + saved.string()));
+  EXPECT_EQ(load(""), saved) << "its own last save";
+  EXPECT_THAT(statistics_.map_displaced(), HasSubstr("saved to " + saved.string()));
   load("city.stillmap");
-  EXPECT_EQ(statistics_.last_save_failure(), "");
+  EXPECT_EQ(statistics_.map_displaced(), "");
 }
 
 TEST_F(DisplacedMapFile, ATileThatWasLostAndMappedAnewStays) {
@@ -332,6 +335,107 @@ TEST_F(DisplacedMapFile, WhatIsInMemoryAloneIsNotEvictedUntilItIsStored) {
   EXPECT_EQ(map_.forget_lost(), 1U);
   evict_all();
   EXPECT_EQ(map_.memory_use().resident_tiles, 1U);
+}
+
+TEST_F(DisplacedMapFile, OfAServerThatMappedNothingThereIsNothingToSave) {
+  const fs::path empty = folder_ / "empty.stillmap";
+  LatestMap nothing;
+  nothing.begin(StaticMap(StaticMapConfig()).view(), {});
+  Statistics statistics;
+  MapSaver saver(nothing, statistics, empty, {}, {.memory_limit_mib = 64});
+  saver.set_source(*this);
+  fs::rename(folder_ / "backup.stillmap", empty);
+  saver.save_if_changed();
+  EXPECT_EQ(statistics.metrics().checkpoints_failing.Value(), 0.0);
+  EXPECT_THAT(statistics.map_displaced(), HasSubstr(empty.string()));
+  saver.save_at_end();
+  EXPECT_THAT(others(), testing::ElementsAre(empty)) << "and no empty file beside it";
+}
+
+TEST_F(DisplacedMapFile, ALinkThatTookItsNameIsFollowed) {
+  const ScratchFolder disk;
+  const fs::path target = disk / "city.stillmap";
+  fs::remove(file_);
+  fs::create_symlink(target, file_);
+  map_scan(30.0F);
+  saver_.save_if_changed();
+  EXPECT_EQ(saver_.save_as(""), target);
+  EXPECT_TRUE(fs::is_symlink(file_));
+  EXPECT_TRUE(others().empty());
+  EXPECT_THROW(MapLock{target}, MapFileInUseError);
+  EXPECT_EQ(statistics_.map_displaced(), "");
+  saver_.save_at_end();
+  EXPECT_THAT(tiles_in(target), testing::ElementsAre(0, 1));
+}
+
+TEST_F(DisplacedMapFile, WhereALinkLeadsNowhereTheMapGoesOnBesideIt) {
+  fs::remove(file_);
+  fs::create_symlink(folder_ / "unmounted" / "city.stillmap", file_);
+  map_scan(30.0F);
+  saver_.save_at_end();
+  ASSERT_EQ(others().size(), 1U);
+  EXPECT_THAT(tiles_in(others().front()), testing::ElementsAre(0, 1));
+}
+
+TEST_F(DisplacedMapFile, AFileThatWasMovedAndLinkedIsFollowedWithItsLock) {
+  const ScratchFolder first, second;
+  for (const bool is_copied : {false, true}) {
+    const fs::path name = saver_.save_as("");
+    const fs::path target = (is_copied ? second : first) / "city.stillmap";
+    if (is_copied) {
+      fs::copy_file(name, target);
+      fs::remove(name);
+    } else {
+      fs::rename(name, target);
+    }
+    fs::create_symlink(target, name);
+    map_scan(is_copied ? 50.0F : 30.0F);
+    saver_.save_if_changed();
+    EXPECT_EQ(saver_.save_as(""), target);
+    EXPECT_THROW(MapLock{target}, MapFileInUseError);
+    EXPECT_FALSE(fs::exists(name.string() + ".lock"));
+    EXPECT_FALSE(fs::exists(name.string() + "-wal"));
+    EXPECT_TRUE(others().empty());
+    if (is_copied) {
+      saver_.save_at_end();
+      EXPECT_THAT(tiles_in(target), testing::ElementsAre(0, 1, 2));
+    }
+  }
+}
+
+TEST_F(DisplacedMapFile, ALockThatWasRemovedIsTakenAgainWhereItIsFree) {
+  fs::remove(file_.string() + ".lock");
+  saver_.save_if_changed();
+  EXPECT_THROW(MapLock{file_}, MapFileInUseError);
+  fs::remove(file_.string() + ".lock");
+  const MapLock other(file_);
+  map_scan(30.0F);
+  const fs::path saved = saver_.save_as("");
+  EXPECT_NE(saved, file_);
+  EXPECT_THAT(tiles_in(saved), testing::ElementsAre(0, 1));
+  EXPECT_THAT(tiles_in(file_), testing::ElementsAre(0));
+}
+
+TEST_F(DisplacedMapFile, AConfiguredLinkThatLeadsElsewhereIsTold) {
+  const fs::path link = folder_ / "link.stillmap", target = folder_ / "linked.stillmap";
+  fs::create_symlink(target, link);
+  LatestMap nothing;
+  nothing.begin(StaticMap(StaticMapConfig()).view(), {});
+  Statistics statistics;
+  MapSaver saver(nothing, statistics, link, {}, {.memory_limit_mib = 64});
+  saver.set_source(*this);
+  saver.save_if_changed();
+  EXPECT_EQ(statistics.map_displaced(), "");
+  fs::remove(link);
+  fs::create_symlink(folder_ / "backup.stillmap", link);
+  saver.save_if_changed();
+  EXPECT_THAT(statistics.map_displaced(),
+              HasSubstr("leads to " + (folder_ / "backup.stillmap").string()));
+  EXPECT_EQ(displaced(), 0U);
+  fs::remove(link);
+  fs::create_symlink(target, link);
+  saver.save_if_changed();
+  EXPECT_EQ(statistics.map_displaced(), "");
 }
 
 }  // namespace

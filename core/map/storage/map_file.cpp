@@ -237,7 +237,8 @@ class SqliteMapStore : public MapStore {
     }
   }
 
-  bool copy_to_new(const fs::path& file) override {
+  bool copy_to_new(const fs::path& name) override {
+    const fs::path file = real_file(name);
     try {
       const FreshMapFile fresh(file);
       back_up_to(fresh.path());
