@@ -1,6 +1,8 @@
 #include <cstdlib>
+#include <stdexcept>
 #include <vector>
 
+#include "clients/commands/query/query_report.hpp"
 #include "tests/clients/command_test.hpp"
 
 namespace stillmap::test {
@@ -256,6 +258,29 @@ TEST_F(ServiceCommandTest, WatchTriesItsFileFirst) {
   EXPECT_EQ(content("old.tum"), "mine");
   EXPECT_EQ(run(watch + path("new.tum")).exit_code, 3);
   EXPECT_FALSE(exists("new.tum"));
+}
+
+TEST_F(ServiceCommandTest, WhatAMapHasNotYetIsNoWrongInput) {
+  BackgroundProcess server(server_command(""), folder_ / "server.log");
+  ASSERT_EQ(run("status" + patiently() + on_domain()).exit_code, 0) << content("server.log");
+  for (const std::string asked : {"traversable", "nearest --to 3 0", "check-path --path 0 0 3 0"}) {
+    const ProcessResult early = run(asked + on_domain());
+    EXPECT_EQ(early.exit_code, 1) << asked << early.err;
+    EXPECT_THAT(early.out + early.err, HasSubstr("empty")) << asked;
+  }
+}
+
+TEST(QueryAnswer, WhatOnlyCannotBeAnsweredNowIsNoWrongInput) {
+  MapQueryResult result;
+  EXPECT_NO_THROW(cli::require_answer(result));
+  for (const QueryStatus status : {QueryStatus::stale_continuation, QueryStatus::failed}) {
+    result.status = status;
+    EXPECT_THROW(cli::require_answer(result), std::runtime_error);
+  }
+  for (const QueryStatus status : {QueryStatus::invalid_request, QueryStatus::changes_unknown}) {
+    result.status = status;
+    EXPECT_THROW(cli::require_answer(result), std::invalid_argument);
+  }
 }
 
 }  // namespace

@@ -71,7 +71,7 @@ QueryAnswer run_query(Client& client, const QueryArguments& arguments, const Map
           progress.update(arrived, "of " + std::to_string(total));
         });
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
-    if (answer.result.status != QueryStatus::ok) throw std::invalid_argument(answer.result.reason);
+    require_answer(answer.result);
     answer.times.ms.push_back(took.count());
   }
   return answer;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <stdexcept>
 
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
@@ -92,6 +93,18 @@ std::string describe(const QueryAnswer& answer) {
               : " (median of " + std::to_string(answer.times.ms.size()) + "; p99 " +
                     fixed(answer.times.quantile(0.99), 1) + " ms)\n") +
          (answer.query.since ? tile_line(answer) : std::string());
+}
+
+void require_answer(const MapQueryResult& result) {
+  switch (result.status) {
+    case QueryStatus::ok:
+      return;
+    case QueryStatus::stale_continuation:
+    case QueryStatus::failed:
+      throw std::runtime_error(result.reason);
+    default:
+      throw std::invalid_argument(result.reason);
+  }
 }
 
 bool is_cloud_file(const std::string& file) {

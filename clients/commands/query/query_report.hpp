@@ -21,6 +21,10 @@ struct QueryAnswer {
 /// The same for people, shorter.
 [[nodiscard]] std::string describe(const QueryAnswer& answer);
 
+/// Throws std::invalid_argument for what cannot be asked, and std::runtime_error for what only
+/// cannot be answered now.
+void require_answer(const MapQueryResult& result);
+
 /// "appeared", "changed", "removed".
 [[nodiscard]] const char* name(TileChangeKind kind);
 

@@ -141,12 +141,15 @@ TraversabilityQuery query_of(const TraversableArguments& arguments, Traversabili
   return query;
 }
 
+/// Throws std::invalid_argument for what cannot be asked, and std::runtime_error for what a
+/// server's map has not yet.
 TraversabilityAnswer query_traversability(TraversabilitySource& source,
-                                          const TraversabilityQuery& query) {
+                                          const TraversabilityQuery& query, bool may_grow) {
   TraversabilityAnswer answer = source.traversability(query);
-  if (answer.grid.status != TraversabilityStatus::ok)
-    throw std::invalid_argument(answer.grid.reason);
-  return answer;
+  if (answer.grid.status == TraversabilityStatus::ok) return answer;
+  if (answer.grid.status == TraversabilityStatus::not_found && may_grow)
+    throw std::runtime_error(answer.grid.reason);
+  throw std::invalid_argument(answer.grid.reason);
 }
 
 void draw(const std::string& file, const TraversabilityView& view, TraversabilitySource& source) {
@@ -161,7 +164,8 @@ ExitCode run(const TraversableArguments& arguments) {
   const auto began = std::chrono::steady_clock::now();
   const std::unique_ptr<TraversabilitySource> source = open_traversability_source(arguments.source);
   const TraversabilityQuery query = query_of(arguments, *source);
-  const TraversabilityAnswer answer = query_traversability(*source, query);
+  const TraversabilityAnswer answer =
+      query_traversability(*source, query, arguments.source.map_file.empty());
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
   const TraversabilityView view = view_of_answer(answer, source->robot());
   const TraversabilityReport report{.summary = summarize(answer, query.region),
