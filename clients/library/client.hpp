@@ -222,8 +222,9 @@ class Client {
 
   /// Has the server save its map, resume one that was saved before, and save to that file from then
   /// on. `file` is a plain name beside the configured map file. A map that is missing, damaged,
-  /// newer or of another voxel size is refused, and the running map continues.
-  LoadedMap load_map(const std::string& file);
+  /// newer or of another voxel size is refused, and the running map continues. An empty name means
+  /// back to the last save of the running map.
+  LoadedMap load_map(const std::string& file = {});
 
   /// Has the server start an empty map and trajectory. The map until then is kept in a file beside
   /// the server's map file, unless `discard`; without a map file, one that was never saved by name

@@ -178,6 +178,9 @@ TEST_F(ServiceCommandTest, HasARunningServerSaveLoadAndReset) {
       nlohmann::json::parse(run("load saved.stillmap --json" + on_domain()).out);
   EXPECT_EQ(loaded.at("poses"), 5);
   EXPECT_EQ(loaded.at("tiles"), status.at("tiles"));
+  const nlohmann::json again = nlohmann::json::parse(run("load --json" + on_domain()).out);
+  EXPECT_EQ(again.at("poses"), 5);
+  EXPECT_THAT(std::string(again.at("file")), HasSubstr("saved.stillmap"));
   const ProcessResult not_there = run("load nothing.stillmap" + on_domain());
   EXPECT_EQ(not_there.exit_code, 1);
   EXPECT_THAT(not_there.err, HasSubstr("is not there"));

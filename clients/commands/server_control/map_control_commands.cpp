@@ -90,18 +90,20 @@ void add_load_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<LoadArguments>();
   CommandHandle command =
       program.command("load", "Have the server save its map and resume another one");
-  command
-      .option("FILE", arguments->file,
-              "Plain name of a map file beside the server's configured one")
-      .required();
+  command.option("FILE", arguments->file,
+                 "Plain name of a map file beside the server's configured one; without it, back to "
+                 "the last save of the running map");
   add_client_options(command, arguments->client);
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"
       "  stillmap save before_rain.stillmap && stillmap load before_rain.stillmap\n"
       "  stillmap load depot.stillmap --json | jq .map_id\n"
-      "The running map is saved to its own file first; only where FILE is that file, the map goes\n"
-      "back to what was saved there last, and what was mapped since is gone. From then on the\n"
+      "  stillmap load                               back to the last save\n"
+      "The running map is saved to its own file first; only without FILE, or where it is that "
+      "file,\n"
+      "the map goes back to what was saved there last, and what was mapped since is gone; where\n"
+      "somebody put another map in the file's place, it is that map. From then on the\n"
       "server maps in FILE and saves to it, under a new map id; the next scan is expected where\n"
       "FILE's path ends, so the robot must stand there. A file that is missing, damaged, written\n"
       "by a newer version or of another voxel size is refused, and the running map stays. A\n"
