@@ -10,13 +10,6 @@
 namespace stillmap {
 namespace {
 
-/// Which numbers, from 0 to the highest one, stand in the field.
-std::vector<bool> standing_numbers(const Scan& scan) {
-  std::vector<bool> stands(std::size_t{*std::ranges::max_element(scan.ring)} + 1, false);
-  for (const std::uint16_t ring : scan.ring) stands[ring] = true;
-  return stands;
-}
-
 std::size_t lowest_of(const std::vector<bool>& stands) {
   return static_cast<std::size_t>(std::ranges::find(stands, true) - stands.begin());
 }
@@ -28,6 +21,27 @@ std::size_t step_of(const std::vector<bool>& stands) {
   for (std::size_t number = lowest; number < stands.size(); ++number)
     if (stands[number]) step = std::gcd(step, number - lowest);
   return std::max<std::size_t>(step, 1);
+}
+
+/// Whether it is the greatest number of 8 or of 16 bits, and stands at no measured point.
+bool is_no_ring(const Scan& scan, std::size_t number) {
+  if ((number != 255 && number != 65535) || scan.ring.size() != scan.size()) return false;
+  for (std::size_t i = 0; i < scan.size(); ++i)
+    if (scan.ring[i] == number && is_measured(scan.points_lidar[i])) return false;
+  return true;
+}
+
+/// Which numbers, from 0 to the highest one that is a ring's, stand in the field.
+std::vector<bool> standing_numbers(const Scan& scan) {
+  std::vector<bool> stands(std::size_t{*std::ranges::max_element(scan.ring)} + 1, false);
+  for (const std::uint16_t ring : scan.ring) stands[ring] = true;
+  const std::size_t highest = stands.size() - 1;
+  if (!is_no_ring(scan, highest)) return stands;
+  std::vector<bool> others(stands.begin(), stands.end() - 1);
+  while (!others.empty() && !others.back()) others.pop_back();
+  if (others.empty()) return stands;
+  // One step above the others it may be a ring that saw nothing.
+  return highest < others.size() + step_of(others) ? stands : others;
 }
 
 /// Whether so many numbers above the lowest are missing that the field does not use them: a third.

@@ -159,7 +159,7 @@ std::vector<std::uint16_t> rings_from_field(const Scan& scan, const SensorModel&
   const bool is_from_top = numbered_from_top(scan);
   const auto last = static_cast<std::uint16_t>(sensor.rings - 1);
   for (auto& ring : rings) {
-    ring = numbering.ring_of_number[ring];
+    ring = numbering.ring_of(ring);
     if (!is_from_top) ring = static_cast<std::uint16_t>(last - ring);
   }
   return rings;

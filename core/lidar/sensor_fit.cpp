@@ -45,8 +45,7 @@ std::vector<std::vector<double>> elevations_by_ring(const Scan& scan) {
   std::vector<std::vector<double>> of_ring(static_cast<std::size_t>(numbering.rings));
   for (std::size_t i = 0; i < scan.size(); ++i) {
     const double elevation = measured_elevation(scan.points_lidar[i]);
-    if (std::isfinite(elevation))
-      of_ring[numbering.ring_of_number[scan.ring[i]]].push_back(elevation);
+    if (std::isfinite(elevation)) of_ring[numbering.ring_of(scan.ring[i])].push_back(elevation);
   }
   return of_ring;
 }

@@ -292,5 +292,22 @@ TEST(AssignRings, KeepsTheEndThatAFieldCountsFromBesideAPointOnTheAxis) {
   }
 }
 
+TEST(AssignRings, TakesTheNumberOfPointsThatWereNotMeasuredForNoRing) {
+  for (const bool from_top : {true, false}) {
+    for (const int no_ring : {255, 65535}) {
+      RingedScan ringed = blurred(vlp_16());
+      ringed.scan.ring = numbered(ringed.truth, from_top, 1, 0);
+      for (std::size_t i = 0; i < ringed.scan.size(); i += 3) {
+        ringed.scan.points_lidar[i].setZero();
+        ringed.scan.ring[i] = static_cast<std::uint16_t>(no_ring);
+      }
+      const auto rings = assign_rings(ringed.scan, vlp_16());
+      ASSERT_EQ(rings.size(), ringed.scan.size());
+      for (std::size_t i = 0; i < rings.size(); ++i)
+        ASSERT_EQ(rings[i], i % 3 > 0 ? ringed.truth[i] : (from_top ? 0 : 15)) << no_ring;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace stillmap

@@ -352,5 +352,32 @@ TEST(FitSensor, BelievesTheRingsOfACompensatedScan) {
   }
 }
 
+TEST(FitSensor, TakesTheNumberOfPointsThatWereNotMeasuredForNoRing) {
+  SensorModel ouster;
+  ouster.rings = 64;
+  ouster.fov_up = 22.5 * degree;
+  ouster.fov_down = -22.5 * degree;
+  for (const int no_ring : {255, 65535}) {
+    for (const SensorModel& sensor : {vlp_16(), ouster}) {
+      Scan scan = scan_of(sensor, true);
+      for (std::size_t i = 0; i < scan.size(); i += 3) {
+        scan.points_lidar[i].setConstant(NAN);
+        scan.ring[i] = static_cast<std::uint16_t>(no_ring);
+      }
+      const auto fitted = fit_sensor(scan);
+      EXPECT_EQ(fitted->rings, sensor.rings) << no_ring;
+      EXPECT_NEAR(fitted->beam_elevation(0), sensor.beam_elevation(0), 0.01 * degree);
+      EXPECT_THAT(sensor_mismatch(scan, sensor), IsEmpty());
+    }
+  }
+  // Of a lidar whose rings reach up to it, it is one that saw nothing.
+  SensorModel fine = ouster;
+  fine.rings = 256;
+  Scan scan = scan_of(fine, true);
+  for (std::size_t i = 0; i < scan.size(); ++i)
+    if (scan.ring[i] == 255) scan.points_lidar[i].setZero();
+  EXPECT_EQ(fit_sensor(scan)->rings, 256);
+}
+
 }  // namespace
 }  // namespace stillmap
