@@ -9,6 +9,7 @@
 #include "clients/python/bindings.hpp"
 #include "clients/python/scan.hpp"
 #include "config/loaders/sensor_file.hpp"
+#include "core/dataset/dataset_error.hpp"
 #include "core/dataset/scan_dataset.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 
