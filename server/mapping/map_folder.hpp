@@ -26,6 +26,11 @@ class MapFolder {
   /// Of this map file; the current folder when it is empty.
   MapFolder(const std::filesystem::path& map_file, const SavedMapsLimit& limit);
 
+  /// The folder of another map file, with the same limit.
+  [[nodiscard]] MapFolder of(const std::filesystem::path& map_file) const {
+    return {map_file, limit_};
+  }
+
   /// Absolute. Throws std::invalid_argument for what is no plain name, or is a link that leads
   /// elsewhere.
   [[nodiscard]] std::filesystem::path file_named(const std::string& name) const;

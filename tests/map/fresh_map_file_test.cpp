@@ -111,5 +111,17 @@ TEST_F(FreshMapFileTest, AMapThatHasTheNameOfTheLockIsNoLock) {
   test::expect_equal(open_map_file(other)->load(), test::saved_map(1));
 }
 
+TEST_F(FreshMapFileTest, WhatWasToLieBesideTheFileIsNamedAndStays) {
+  const FreshMapFile own(file_), of_town(folder_ / "town.2026-05-31_142500.stillmap");
+  const FreshMapFile dated(folder_ / "city.2026-05-31_142500.stillmap");
+  for (const FreshMapFile* fresh : {&own, &of_town, &dated})
+    open_map_file(fresh->path())->save(test::saved_map(1));
+  static_cast<void>(folder_.file("city.1.stillmap.new-letter", "mine"));
+  static_cast<void>(folder_.file("city.2.stillmap.new-backup/a.txt", "mine"));
+  { const MapLock lock(file_); }
+  EXPECT_FALSE(fs::exists(own.path()));
+  EXPECT_EQ(fresh_files_beside(file_), std::vector<fs::path>{dated.path()});
+}
+
 }  // namespace
 }  // namespace stillmap

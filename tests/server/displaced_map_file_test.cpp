@@ -399,6 +399,9 @@ TEST_F(DisplacedMapFile, AFileThatWasMovedAndLinkedIsFollowedWithItsLock) {
     if (is_copied) {
       saver_.save_at_end();
       EXPECT_THAT(tiles_in(target), testing::ElementsAre(0, 1, 2));
+      const NewMap begun =
+          saver_.begin_anew(false, [this](auto id, const auto& tiles) { begin(id, tiles); });
+      EXPECT_EQ(begun.kept_file.parent_path(), second.path());
     }
   }
 }

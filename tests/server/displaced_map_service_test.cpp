@@ -68,6 +68,9 @@ TEST_F(DisplacedMapService, LoadsABackupThatWasPutInTheFilesPlaceAndKeepsTheRunn
     const std::string saved = client_.save_map();
     EXPECT_NE(saved, setup_.map_file());
     EXPECT_EQ(content_of(setup_.map_file()), content_of(backup()));
+    EXPECT_THAT(client_.status().reason,
+                testing::AllOf(testing::HasSubstr("saved to " + saved),
+                               testing::Not(testing::HasSubstr("in memory alone"))));
     EXPECT_EQ(poses_in(saved), is_copied ? 8U : 12U);
     EXPECT_EQ(client_.load_map("map.stillmap").pose_count, 8U);
   }

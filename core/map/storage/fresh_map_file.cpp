@@ -52,4 +52,22 @@ void remove_left_fresh_files(const fs::path& file) {
   }
 }
 
+std::vector<fs::path> fresh_files_beside(const fs::path& file) {
+  const fs::path real = real_file(file);
+  const std::string begin = real.stem().string() + ".";
+  const std::string end = beside(real.extension(), folder_suffix).string();
+  std::vector<fs::path> files;
+  for (const fs::path& entry : entries_of(real.parent_path())) {
+    std::string name = entry.filename().string();
+    if (name.size() < begin.size() + end.size() + letters_of_folder) continue;
+    name.resize(name.size() - letters_of_folder);
+    std::error_code error;
+    const fs::path fresh = entry / name_in_folder;
+    if (name.starts_with(begin) && name.ends_with(end) && is_of_fresh_file(entry) &&
+        fs::exists(fresh, error))
+      files.push_back(fresh);
+  }
+  return files;
+}
+
 }  // namespace stillmap

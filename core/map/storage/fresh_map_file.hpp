@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <vector>
 
 #include "core/process/temporary_folder.hpp"
 
@@ -25,5 +26,11 @@ class FreshMapFile {
 /// Removes what killed processes left of such folders. For who holds the lock of the file (MapLock)
 /// and has made none yet.
 void remove_left_fresh_files(const std::filesystem::path& file);
+
+/// The fresh files that were to be put beside `file` under a longer name, as that of
+/// "city.2026-05-31_142500.stillmap" beside "city.stillmap". A process that was killed left them,
+/// or one makes them now; each may be whole.
+[[nodiscard]] std::vector<std::filesystem::path> fresh_files_beside(
+    const std::filesystem::path& file);
 
 }  // namespace stillmap
