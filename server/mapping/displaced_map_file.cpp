@@ -182,7 +182,9 @@ void MapSaver::leave_name() {
 void MapSaver::remove_if_empty(const fs::path& made_beside) {
   if (!left_file_ || !store_ || store_->fate() != MapFileFate::kept || store_->holds_map()) return;
   std::error_code ignored;
-  fs::remove(made_beside, ignored);
+  // SQLite leaves its files beside one that is gone.
+  for (const char* suffix : {"", "-wal", "-shm"})
+    fs::remove(made_beside.string() + suffix, ignored);
 }
 
 void MapSaver::write_anew_from_memory() {
