@@ -157,8 +157,9 @@ class Mapper {
 
   /// The next scans are of another lidar at the same place on the robot, or of the same one by
   /// another description, with labels from another source: poses and map go on. `config` differs
-  /// in `sensor` and `prepare` alone; throws std::invalid_argument with its faults, and nothing has
-  /// changed then. Labels that are still to come are lost.
+  /// in `sensor`, but for its IMU, and `prepare` alone; throws std::invalid_argument with its
+  /// faults, and nothing has changed then. Scans whose labels are still to come stay out of the
+  /// map.
   void use_sensor(const MapperConfig& config, std::unique_ptr<SegmentationPipeline> segmentation);
 
   /// Whether a scan was registered since the map began or the lidar was relocated: before, nothing

@@ -43,8 +43,8 @@ class LabelCensus {
  private:
   std::uint64_t labels_ = 0;
   std::uint64_t unknown_ = 0;
-  std::uint32_t classes_alone_ = 0;
-  std::uint32_t beyond_classes_ = 0;
+  std::uint64_t classes_alone_ = 0;
+  std::uint64_t beyond_classes_ = 0;
 };
 
 }  // namespace stillmap

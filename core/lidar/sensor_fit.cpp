@@ -50,22 +50,35 @@ std::vector<std::vector<double>> elevations_by_ring(const Scan& scan) {
   return of_ring;
 }
 
-/// Whether half of the points lie far from the middles of their rings: the field then names no
-/// rings about this frame's axis, as that of several lidars that lean, each in its way. Motion
-/// within a scan, taken out or not, moves most points by less than a few degrees.
-bool are_scattered(const std::vector<std::vector<double>>& of_ring,
-                   const std::vector<double>& medians) {
+/// Whether a quarter of the points lie far from the middles of their rings, within sectors of
+/// azimuth: the field then names no rings, as that of several lidars that lean, each in its way.
+/// Rings of one that leans, or whose cloud is in the robot's frame, bend smoothly; motion within a
+/// scan, taken out or not, moves most points by less than a few degrees.
+bool are_scattered(const Scan& scan, const std::vector<double>& medians) {
   constexpr double max_distance = 3.0 * degree;
+  constexpr std::size_t sectors = 12;
   const auto [low, high] = std::ranges::minmax(medians);
   const double step = (high - low) / static_cast<double>(medians.size() - 1);
+  const RingNumbering numbering = ring_numbering(scan);
+  std::vector<std::vector<double>> pieces(medians.size() * sectors);
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const Eigen::Vector3d p = scan.points_lidar[i].cast<double>();
+    const double elevation = measured_elevation(scan.points_lidar[i]);
+    if (!std::isfinite(elevation)) continue;
+    const double turn = 0.5 + std::atan2(p.y(), p.x()) / (2.0 * std::numbers::pi);
+    const auto sector = std::min(static_cast<std::size_t>(turn * sectors), sectors - 1);
+    pieces[numbering.ring_of(scan.ring[i]) * sectors + sector].push_back(elevation);
+  }
   std::size_t points = 0, far = 0;
-  for (std::size_t ring = 0; ring < of_ring.size(); ++ring) {
-    points += of_ring[ring].size();
-    far += static_cast<std::size_t>(std::ranges::count_if(of_ring[ring], [&](double elevation) {
-      return std::abs(elevation - medians[ring]) > std::max(step, max_distance);
+  for (std::vector<double>& piece : pieces) {
+    if (piece.empty()) continue;
+    const double middle = median_of(piece);
+    points += piece.size();
+    far += static_cast<std::size_t>(std::ranges::count_if(piece, [&](double elevation) {
+      return std::abs(elevation - middle) > std::max(step, max_distance);
     }));
   }
-  return 2 * far > points;
+  return 4 * far > points;
 }
 
 /// Interpolates or extrapolates the elevations of rings without points; false with fewer than two.
@@ -146,7 +159,7 @@ std::optional<SensorModel> fit_rings(const Scan& scan) {
   for (std::vector<double>& values : of_ring)
     elevations.push_back(values.size() < min_points_on_ring ? NAN : median_of(values));
   if (elevations.size() < 4 || !complete(elevations)) return std::nullopt;
-  if (are_scattered(of_ring, elevations)) return std::nullopt;
+  if (are_scattered(scan, elevations)) return std::nullopt;
   std::ranges::sort(elevations, std::greater<>{});
   return fit_beams(std::move(elevations));
 }

@@ -10,11 +10,11 @@
 namespace stillmap {
 
 /// The sensor model that fits a scan: by the elevations of its rings, which a field numbers (unless
-/// half of the points lie far from where it says) or which nearly all points lie close to; else by
-/// the field of view that it fills. A built-in sensor (VLP-16, HDL-32E, HDL-64E) where one fits
-/// within half a degree, though a quarter of its rings saw nothing, as those that look into the
-/// sky; else one made of the scan's own rings, or where it shows none (Livox, points moved to one
-/// time) of 40 bands between its lowest and highest points. Nothing when the scan has too few
+/// a quarter of the points lie far from where it says) or which nearly all points lie close to;
+/// else by the field of view that it fills. A built-in sensor (VLP-16, HDL-32E, HDL-64E) where one
+/// fits within half a degree, though a quarter of its rings saw nothing, as those that look into
+/// the sky; else one made of the scan's own rings, or where it shows none (Livox, points moved to
+/// one time) of 40 bands between its lowest and highest points. Nothing when the scan has too few
 /// points.
 [[nodiscard]] std::optional<SensorModel> fit_sensor(const Scan& scan);
 

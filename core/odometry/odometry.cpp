@@ -126,6 +126,7 @@ void Odometry::use_sensor(const SensorModel& sensor) {
   // A map that was begun by rings goes on by surfaces once RingStart has it from enough places.
   const bool has_rings = sensor.pattern == ScanPattern::rings;
   if (!state.started || !has_rings) state.is_by_surfaces = begins_by_surfaces;
+  if (!state.started && !state.is_by_surfaces) state.ring_start.set_prior_map(state.prior_map);
 }
 
 void Odometry::set_clock(std::int64_t shift_ns) {

@@ -234,6 +234,8 @@ void Odometry::State::begin_anew(const FeatureSets& features, OdometryResult& re
   ring_start.clear();
   first_scan.reset();
   started = false;
+  // Another lidar may have been told since.
+  is_by_surfaces = is_registered_by_surfaces(sensor, config);
   result = OdometryResult{.T_map_lidar = last.T_map_lidar};
 }
 

@@ -14,8 +14,8 @@ class ScanIntervals {
   /// The first scan that is registered, and every next one.
   void begin(std::int64_t stamp_ns);
   void add(std::int64_t stamp_ns);
-  /// Another lidar goes on where the last one was.
-  void set_period(double period_s) { period_s_ = mean_interval_s_ = period_s; }
+  /// Another lidar goes on where the last one was; what was learnt of its stamps stays.
+  void set_period(double period_s) { period_s_ = period_s; }
   /// The clock was set: so much later is what it would have called the time of the last scan.
   void set_clock(std::int64_t shift_ns);
 

@@ -277,8 +277,7 @@ void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std:
     statistics_.bad_cloud(from_cloud.fault.counter);
     return drop("bad_cloud", 1, "bad cloud: " + from_cloud.fault.reason);
   }
-  if (std::exchange(lidar->last_frame, frame) != frame) lidar->clouds_of_frame = 0;
-  ++lidar->clouds_of_frame;
+  lidar->frame_read = frame;
   report_labels(*lidar, from_cloud.label_census);
   report(*lidar, cloud_changes, *scan);
   if (sweeps_ != nullptr) return sweeps_->add(lidar->index, *std::move(scan), stop);
@@ -312,7 +311,8 @@ void ScanReceiver::report_labels(const Lidar& lidar, const LabelCensus& census) 
   spdlog::warn(
       "labels on {} are read as SemanticKITTI ids and {}: set {}'labels.source: model' to do "
       "without them; counted as {}",
-      topic_, doubt, are_classes ? "'input.label_kind: classes', or " : "", counter);
+      topic_, doubt,
+      are_classes ? "'input.label_kind: classes' where 1 is car and 9 road, or " : "", counter);
 }
 
 void ScanReceiver::report(Lidar& lidar, const std::string& cloud_changes, const Scan& scan) {
@@ -335,9 +335,9 @@ void ScanReceiver::report(Lidar& lidar, const std::string& cloud_changes, const 
 }
 
 void ScanReceiver::recognise(Lidar& lidar, const Scan& scan) {
-  constexpr std::uint64_t clouds_in_a_row = 10;
-  if (lidar.recognition->sensor() && lidar.clouds_of_frame < clouds_in_a_row) return;
+  if (lidar.recognition->sensor() && lidar.frame_read != lidar.frame_told) return;
   if (!lidar.recognition->learn(scan)) return;
+  lidar.frame_told = lidar.frame_read;
   lidar.sensor = *lidar.recognition->sensor();
   spdlog::info("the lidar, as its scans tell: {}", in_words(lidar.sensor));
 }

@@ -95,9 +95,9 @@ class ScanReceiver {
     std::uint64_t scans_read = 0;
     /// Where the configuration does not name the lidar.
     std::optional<SensorRecognition> recognition{};
-    /// Of the last cloud, and how many in a row had it.
-    std::string last_frame{};
-    std::uint64_t clouds_of_frame = 0;
+    /// Of the last cloud, and of the one that told the lidar.
+    std::string frame_read{};
+    std::string frame_told{};
   };
 
   ScanReceiver(dds::Participant& participant, const ServerConfig& config,
@@ -113,8 +113,7 @@ class ScanReceiver {
   void report_labels(const Lidar& lidar, const LabelCensus& census);
   /// Logs changes of the cloud's layout, and now and then checks that scans fit the sensor model.
   void report(Lidar& lidar, const std::string& cloud_changes, const Scan& scan);
-  /// By the scan, where it tells the lidar. Of two lidars on one topic, whose clouds take turns,
-  /// none tells what the other is.
+  /// By the scan, where it tells the lidar. Of two on one topic, none tells what the other is.
   static void recognise(Lidar& lidar, const Scan& scan);
   void queue_scan(QueuedScan queued, const std::stop_token& stop);
   void drop(const std::string& reason, std::size_t count, const std::string& detail);

@@ -335,6 +335,28 @@ TEST(FitSensor, LeavesOutARingFieldThatNamesNoRings) {
   EXPECT_EQ(fit_sensor(scan)->name, "HDL-32E");
 }
 
+/// Above the robot's origin, beside a wall: rings go up and down by degrees, but smoothly.
+TEST(FitSensor, BelievesTheRingsOfACloudInTheFrameOfTheRobot) {
+  const SensorModel sensor = vlp_16();
+  Scan scan;
+  for (int ring = 0; ring < sensor.rings; ++ring) {
+    for (int column = 0; column < 720; ++column) {
+      const double azimuth = 0.5 * column * degree, up = sensor.beam_elevation(ring);
+      const Eigen::Vector3d ray(std::cos(up) * std::cos(azimuth), std::cos(up) * std::sin(azimuth),
+                                std::sin(up));
+      const Eigen::Array3d wall(ray.x() > 0.0 ? 1.5 : -4.5, ray.y() > 0.0 ? 2.0 : -6.0,
+                                ray.z() > 0.0 ? 2.0 : -1.0);
+      const double range_m = (wall / ray.array()).minCoeff();
+      scan.points_lidar.push_back((range_m * ray + Eigen::Vector3d(0.0, 0.0, 1.0)).cast<float>());
+      scan.ring.push_back(static_cast<std::uint16_t>(ring));
+    }
+  }
+  const auto fitted = fit_sensor(scan);
+  ASSERT_TRUE(fitted);
+  EXPECT_EQ(fitted->pattern, ScanPattern::rings);
+  EXPECT_EQ(fitted->rings, sensor.rings);
+}
+
 TEST(FitSensor, BelievesTheRingsOfACompensatedScan) {
   // To the end of a sweep: 3 m on, as of a car on a motorway, or 10 degrees down, of a hand.
   for (const SensorModel& sensor : {vlp_16(), hdl_32e(), hdl_64e()}) {

@@ -45,6 +45,15 @@ TEST(ScanIntervals, AreTheStampsOfASensorThatTurnsFaster) {
   }
 }
 
+TEST(ScanIntervals, GoOnWhenALidarOfAnotherPeriodIsTold) {
+  ScanIntervals intervals(0.1);
+  intervals.begin(0);
+  for (int k = 1; k <= 20; ++k) intervals.add(50 * k * ms_ns);
+  intervals.set_period(0.1);
+  EXPECT_DOUBLE_EQ(intervals.since_last_s(1050 * ms_ns), 0.05);
+  EXPECT_DOUBLE_EQ(intervals.since_last_s(1550 * ms_ns), 0.55);
+}
+
 TEST(ScanIntervals, AreTheStampsOfASensorThatKeepsNoPeriod) {
   ScanIntervals intervals(0.1);
   intervals.begin(0);
