@@ -126,7 +126,8 @@ void require_semantic_kitti_labels(const ScanDataset& dataset, const std::filesy
   if (doubt.empty()) return;
   throw DatasetError(path, "its labels would be read as SemanticKITTI ids and " + doubt +
                                ". labels_are_classes=True reads them as classes (0 is unlabeled, 1 "
-                               "car), labels_are_classes=False as ids all the same");
+                               "car, 9 road), labels_are_classes=False as ids all the same, "
+                               "which does no harm where the labels are not used");
 }
 
 void bind_open_dataset(py::module_& module) {

@@ -33,9 +33,10 @@ std::string doubt_of_label_kind(const ScanDataset& dataset) {
   if (doubt.empty()) return {};
   return "the labels of " + dataset.file(0).string() +
          " and others would be read as SemanticKITTI ids and " + doubt +
-         ". --label-kind classes reads them as classes (0 is unlabeled, 1 car: where 0 is car, add "
-         "1 first), --label-kind semantic_kitti as they are; 'stillmap dataset export IN OUT "
-         "--label-kind classes' writes a sequence with ids for commands without that option";
+         ". --label-kind classes reads them as classes (0 is unlabeled, 1 car, 9 road: where 0 is "
+         "car, add 1 first), --label-kind semantic_kitti as they are; 'stillmap map --labels "
+         "model' does without them; 'stillmap dataset export IN OUT --label-kind classes' writes a "
+         "sequence with ids for commands without that option";
 }
 
 }  // namespace

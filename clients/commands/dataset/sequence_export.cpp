@@ -65,10 +65,12 @@ class SequenceExporter {
     if (!frame) return;
     const std::optional<MappedScan> mapped = mapper_.process(frame->scan);
     std::vector<std::uint32_t> raw_labels = frame->raw_labels;
-    scans_with_labels_ += raw_labels.empty() ? 0U : 1U;
+    const bool has_own =
+        std::ranges::any_of(raw_labels, [](std::uint32_t raw) { return (raw & 0xFFFFU) != 0; });
+    scans_with_labels_ += has_own ? 1U : 0U;
     if (mapped) {
       T_map_lidar_ = mapped->odometry.T_map_lidar;
-      if (raw_labels.empty()) {
+      if (!has_own) {
         raw_labels = labels_of_all_points(frame->scan, mapped->labelled.labels.classes, prepare_);
       }
     } else {
