@@ -321,8 +321,12 @@ std::size_t MapTiles::forget_stored(std::span<const TileId> kept) {
     unreadable_.erase(id);
     --non_resident_count_;
   }
-  for (const auto& [id, resident] : residents_) unsaved_.insert(id);
+  keep_in_memory();
   return gone.size();
+}
+
+void MapTiles::keep_in_memory() {
+  for (const auto& [id, resident] : residents_) unsaved_.insert(id);
 }
 
 void MapTiles::stored(TileId id, std::uint64_t step) {

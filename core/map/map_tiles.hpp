@@ -110,6 +110,8 @@ class MapTiles {
   /// Nothing is in the tile store any more: the tiles of it alone are gone, but for these, and what
   /// is in memory is to be stored. Returns how many are gone.
   std::size_t forget_stored(std::span<const TileId> kept);
+  /// What is in memory is to be stored again before it is evicted.
+  void keep_in_memory();
   /// The tile is stored as it was at the end of this step.
   void stored(TileId id, std::uint64_t step);
 

@@ -362,6 +362,8 @@ void StaticMap::checkpoint_stored(std::uint64_t step) {
   for (const TileId id : std::exchange(state_->in_checkpoint, {})) state_->tiles.stored(id, step);
 }
 
+void StaticMap::keep_in_memory() { state_->tiles.keep_in_memory(); }
+
 std::size_t StaticMap::forget_lost() { return state_->tiles.forget_stored(state_->in_checkpoint); }
 
 MemoryUse StaticMap::memory_use() const { return state_->tiles.memory_use(); }

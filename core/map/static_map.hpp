@@ -175,6 +175,8 @@ class StaticMap {
   /// the last checkpoint was taken are gone, as those that show nothing any more, and the others
   /// stay in memory until it is stored. It must be one of everything. Returns how many are gone.
   std::size_t forget_lost();
+  /// What the tile store had is gone: nothing that is in memory is evicted before it is stored.
+  void keep_in_memory();
   /// Evicts tiles that are stored and out of the reach of the lidar, farthest first, until the map
   /// takes no more than this. Returns how many. They are reloaded when they are needed.
   std::size_t evict(const Eigen::Vector3d& position_map, std::size_t limit_bytes);

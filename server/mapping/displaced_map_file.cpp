@@ -1,4 +1,5 @@
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <stdexcept>
@@ -34,6 +35,14 @@ std::string words_of(MapFileFate fate) {
 
 void MapSaver::count_failure(const std::exception& error) {
   statistics_.map_save_failed(error.what());
+  try {
+    // What is in memory of it is nowhere else, and must not be evicted.
+    if (store_ && !file_.empty() && store_->fate() == MapFileFate::overwritten)
+      source_->stored_is_gone();
+  } catch (const MapFileError&) {
+    // That it cannot be looked at says nothing of what it holds.
+    throttled_log_.error("unseen", "the map file cannot be looked at");
+  }
   // Where the map fills its memory, it is frozen.
   source_->checkpoint_failed();
 }
@@ -68,11 +77,6 @@ void MapSaver::look_after_file() {
   statistics_.map_save_failed(displaced.what());
   statistics_.count(counter);
   spdlog::warn("the running map goes on in {}", file_.string());
-  if (left_file_) {
-    statistics_.set_map_displaced(left_file_->string() +
-                                  " is not the running map's file any more; that is saved to " +
-                                  file_.string() + " until another map is loaded");
-  }
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
   // What is in memory alone is still to be saved.
   if (saved_map_id_ != 0 || is_empty()) statistics_.map_saved(took.count());
@@ -125,6 +129,8 @@ bool MapSaver::follow_name() {
   std::unique_ptr<MapLock> target_lock;
   try {
     if (target != file_) target_lock = std::make_unique<MapLock>(target);
+    // Before the store is left.
+    if (::access(target.c_str(), W_OK) != 0) throw MapFileError(target, "cannot be written");
   } catch (const MapFileError& error) {
     throttled_log_.error("lock", error.what());
     return false;
@@ -159,7 +165,7 @@ bool MapSaver::write_anew(MapFileFate fate) {
     auto target_lock = std::make_unique<MapLock>(target);
     if (!store_->copy_to_new(target)) throw MapFileError(target, "was made by somebody just now");
     leave_name();
-    leave_store_for(target);
+    leave_store_for(target, is_locked_by_another());
     lock_ = std::move(target_lock);
   }
   static_cast<void>(open_store());
@@ -180,7 +186,13 @@ void MapSaver::leave_name() {
 }
 
 void MapSaver::remove_if_empty(const fs::path& made_beside) {
-  if (!left_file_ || !store_ || store_->fate() != MapFileFate::kept || store_->holds_map()) return;
+  try {
+    if (!left_file_ || !store_ || store_->fate() != MapFileFate::kept || store_->holds_map())
+      return;
+  } catch (const MapFileError&) {
+    // It may hold something.
+    return;
+  }
   std::error_code ignored;
   // SQLite leaves its files beside one that is gone.
   for (const char* suffix : {"", "-wal", "-shm"})
@@ -196,16 +208,21 @@ void MapSaver::write_anew_from_memory() {
   is_session_ = false;
   saved_map_id_ = 0;
   is_memory_alone_ = true;
-  leave_store_for(target);
+  leave_store_for(target, is_locked_by_another());
   lock_ = std::move(target_lock);
   static_cast<void>(open_store());
 }
 
-void MapSaver::leave_store_for(const fs::path& target) {
+bool MapSaver::is_locked_by_another() const {
+  std::error_code unknown;
+  return !lock_->is_held() && fs::exists(file_.string() + ".lock", unknown);
+}
+
+void MapSaver::leave_store_for(const fs::path& target, bool is_log_of_another) {
   const auto move = [&] {
     const auto remove_log = store_->abandon();
     store_.reset();
-    remove_log();
+    if (!is_log_of_another) remove_log();
     return target;
   };
   if (tiles_) {
@@ -214,6 +231,10 @@ void MapSaver::leave_store_for(const fs::path& target) {
     static_cast<void>(move());
   }
   file_ = target;
+  if (!left_file_) return;
+  statistics_.set_map_displaced(left_file_->string() +
+                                " is not the running map's file any more; that is saved to " +
+                                file_.string() + " until another map is loaded");
 }
 
 void MapSaver::leave_out_lost_tiles(SavedMap& map) {

@@ -44,6 +44,8 @@ class CheckpointSource {
   /// Evicted tiles that are not in the last checkpoint, which is of everything and not stored yet,
   /// are lost: the map goes on without them. Nothing to do where none are evicted.
   virtual void forget_lost_tiles() {}
+  /// What was stored is not there any more: nothing that is in memory may be evicted.
+  virtual void stored_is_gone() {}
 };
 
 /// The map that a reset began.
@@ -208,8 +210,11 @@ class MapSaver {
   void remove_if_empty(const std::filesystem::path& made_beside);
   /// Tiles that were in the file alone are lost with its content.
   void write_anew_from_memory();
-  /// The next file to be opened is `target`; the one that was open is somebody else's.
-  void leave_store_for(const std::filesystem::path& target);
+  /// The next file to be opened is `target`; the one that was open is somebody else's, and its log
+  /// stays where another process has that open.
+  void leave_store_for(const std::filesystem::path& target, bool is_log_of_another = false);
+  /// Somebody removed the lock of the current file, and another process has it by now.
+  [[nodiscard]] bool is_locked_by_another() const;
   void leave_name();
   void leave_out_lost_tiles(SavedMap& map);
   /// A map without a file that was never saved. Throws RefusedNow.

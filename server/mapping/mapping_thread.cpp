@@ -312,6 +312,10 @@ MemoryUse MappingThread::memory_use() {
   return use;
 }
 
+void MappingThread::stored_is_gone() {
+  requests_.run([&] { mapper_.static_map().keep_in_memory(); });
+}
+
 void MappingThread::forget_lost_tiles() {
   requests_.run([&] {
     StaticMap& map = mapper_.static_map();

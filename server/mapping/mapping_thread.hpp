@@ -101,6 +101,7 @@ class MappingThread : public CheckpointSource {
   [[nodiscard]] MemoryUse memory_use() override;
   /// The map without them is published.
   void forget_lost_tiles() override;
+  void stored_is_gone() override;
 
   /// Voxels in the box (map frame [m]) that are removed from the planning view, in no order. Scans
   /// go on being mapped meanwhile: each tile is as it was at some moment of the call. Throws

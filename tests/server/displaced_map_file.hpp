@@ -43,6 +43,7 @@ class DisplacedMapFile : public testing::Test, public CheckpointSource {
   }
   void checkpoint_stored(std::uint64_t step) override { map_.checkpoint_stored(step); }
   void checkpoint_failed() override { ++failed_; }
+  void stored_is_gone() override { map_.keep_in_memory(); }
   void forget_lost_tiles() override {
     map_.forget_lost();
     latest_map_.publish(map_.view());

@@ -444,5 +444,16 @@ TEST_F(DisplacedMapFile, AConfiguredLinkThatLeadsElsewhereIsTold) {
   EXPECT_EQ(statistics.map_displaced(), "");
 }
 
+TEST_F(DisplacedMapFile, WhatIsInMemoryStaysThereWhereItsFileIsGone) {
+  map_scan(30.0F);
+  saver_.save_if_changed();
+  map_scan(50.0F);
+  while_saving_ = [this] { copy_over(); };
+  EXPECT_THROW(saver_.save_if_changed(), MapFileError);
+  evict_all();
+  EXPECT_EQ(map_.memory_use().non_resident_tiles, 0U);
+  EXPECT_THAT(tiles_in(saver_.save_as("")), testing::ElementsAre(0, 1, 2));
+}
+
 }  // namespace
 }  // namespace stillmap::server

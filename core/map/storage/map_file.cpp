@@ -368,7 +368,8 @@ class SqliteMapStore : public MapStore {
     if (!checkpoint.executeStep()) return;
     log_is_empty_ = number(0) == 0 && number(1) == number(2);
     // A reader may keep all of the log out of the file, or all but its begin.
-    watch_.set_partly_written(number(1) != number(2) && number(2) > 0);
+    // Below zero: it did not run, and somebody else's may.
+    watch_.set_partly_written(number(1) < 0 || (number(1) != number(2) && number(2) > 0));
   }
 
   template <typename Action>

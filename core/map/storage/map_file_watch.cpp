@@ -156,9 +156,11 @@ bool MapFileWatch::is_own_content(bool is_alone) const {
 }
 
 bool MapFileWatch::has_empty_log() const {
-  std::error_code none_there;
-  const std::uintmax_t bytes = fs::file_size(beside(file_, "-wal"), none_there);
-  return none_there || bytes == 0;
+  std::error_code fault;
+  const std::uintmax_t bytes = fs::file_size(beside(file_, "-wal"), fault);
+  if (fault && fault != std::errc::no_such_file_or_directory)
+    throw not_visible(file_, "its log: " + fault.message());
+  return fault || bytes == 0;
 }
 
 std::function<void()> MapFileWatch::log_removal() const {
