@@ -22,6 +22,7 @@ from loops import inverse, matrix, times, true_poses
 CASES = [
     ("yard 21, 16 rings", "--preset yard --sensor vlp_16 --seed 21", 600, 300, "", "--preset yard --sensor vlp_16 --seed 22"),
     ("the same, no labels", "--preset yard --sensor vlp_16 --seed 21", 600, 300, "--labels none", ""),
+    ("yard 21, 16 rings, more than 40 submaps", "--preset yard --sensor vlp_16 --seed 21", 600, 1700, "", ""),
     ("yard 21, 64 rings", "--preset yard --sensor hdl_64e --seed 21", 600, 300, "", ""),
     ("the same 64 rings, no labels", "--preset yard --sensor hdl_64e --seed 21", 600, 300, "--labels none", ""),
     ("quiet 11, 16 rings", "--preset quiet --sensor vlp_16 --seed 11", 400, 400, "", "--preset quiet --sensor vlp_16 --seed 12"),
