@@ -75,8 +75,8 @@ struct SubmapMatch {
 };
 
 /// Looks for b in the window round where it is expected in a: in plan, which also tells the second
-/// best place, then by registration. Nothing where their grounds do not meet, or nothing that stands
-/// up does.
+/// best place, then by registration. Nothing where their grounds do not meet, or nothing that
+/// stands up does.
 [[nodiscard]] std::optional<SubmapMatch> match_submaps(const PlacedSubmap& a, const PlacedSubmap& b,
                                                        const Eigen::Isometry3d& T_a_b_expected,
                                                        const AlignmentWindow& window,
