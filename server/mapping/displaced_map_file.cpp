@@ -58,6 +58,7 @@ void MapSaver::look_after_file_first() {
 
 void MapSaver::look_after_file() {
   if (!store_ || file_.empty()) return;
+  tell_of_left_maps();
   const MapFileFate fate = store_->fate();
   if (fate == MapFileFate::kept && keep_lock()) return tell_where_name_leads();
   if (fate == MapFileFate::replaced && follow_name()) return;
@@ -95,6 +96,10 @@ bool MapSaver::keep_lock() {
                              "; its lock was removed, and another server may be started on it");
   }
   return true;
+}
+
+void MapSaver::tell_of_left_maps() {
+  if (!left_maps_.empty()) statistics_.set_maps_left(left_maps_.in_words());
 }
 
 void MapSaver::tell_where_name_leads() {

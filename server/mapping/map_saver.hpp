@@ -15,6 +15,7 @@
 
 #include "core/map/storage/map_file.hpp"
 #include "core/map/storage/map_lock.hpp"
+#include "server/mapping/left_maps.hpp"
 #include "server/mapping/map_folder.hpp"
 #include "server/monitoring/log.hpp"
 #include "server/monitoring/statistics.hpp"
@@ -200,6 +201,7 @@ class MapSaver {
   /// Of a file that is kept: takes its lock again where somebody removed it. False where another
   /// process has it.
   [[nodiscard]] bool keep_lock();
+  void tell_of_left_maps();
   /// Tells of a configured link that leads to another file by now.
   void tell_where_name_leads();
   /// Goes on in the file itself, or a copy of its last state, that has the name, or that a link of
@@ -261,6 +263,7 @@ class MapSaver {
   std::filesystem::path configured_file_;
   MapFolder folder_;
   std::unique_ptr<MapLock> lock_;
+  LeftMaps left_maps_;
   std::map<std::string, std::string> metadata_;
   std::map<std::string, std::string> stored_metadata_;
   std::size_t memory_limit_bytes_;

@@ -5,8 +5,6 @@
 #include <map>
 #include <stdexcept>
 
-#include "core/map/storage/fresh_map_file.hpp"
-
 namespace stillmap::server {
 namespace {
 
@@ -22,20 +20,7 @@ std::size_t tile_cache_bytes(const MapFileConfig& config) {
   return (std::size_t{config.memory_limit_mib} << 20) / 8;
 }
 
-/// A running map that was being written beside its name may be whole nowhere else.
-void tell_of_unfinished_files(const std::filesystem::path& map_file) {
-  if (map_file.empty()) return;
-  for (const auto& file : fresh_files_beside(map_file)) {
-    spdlog::warn(
-        "{} is a map that a server was writing beside {} when it was killed, unless one writes it "
-        "now: 'stillmap map-check' tells whether it is whole; move it to a name, or remove its "
-        "folder",
-        file.string(), map_file.string());
-  }
-}
-
 std::optional<SavedMap> saved_map(MapSaver& saver, const ServerConfig& config) {
-  tell_of_unfinished_files(config.map.file);
   if (!config.map.load_at_start) {
     if (const auto kept = saver.set_saved_map_aside()) {
       spdlog::info("the map in {} is kept as {} (map.load_at_start is false)",

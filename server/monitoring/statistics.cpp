@@ -125,6 +125,11 @@ void Statistics::set_map_displaced(const std::string& text) {
   map_displaced_ = text;
 }
 
+void Statistics::set_maps_left(const std::string& text) {
+  const std::scoped_lock lock(mutex_);
+  maps_left_ = text;
+}
+
 void Statistics::set_sensor(const std::string& name) {
   const std::scoped_lock lock(mutex_);
   sensor_ = name;
@@ -228,6 +233,11 @@ std::string Statistics::last_save_failure() const {
 std::string Statistics::map_displaced() const {
   const std::scoped_lock lock(mutex_);
   return map_displaced_;
+}
+
+std::string Statistics::maps_left() const {
+  const std::scoped_lock lock(mutex_);
+  return maps_left_;
 }
 
 std::string Statistics::last_segmentation_failure() const {

@@ -59,6 +59,8 @@ class Statistics {
   /// Told there also while saves succeed: which file they do not go to. Empty: they go where they
   /// should.
   void set_map_displaced(const std::string& text);
+  /// Told there, too: what killed servers left of maps, in words. Empty: nothing.
+  void set_maps_left(const std::string& text);
 
   /// The lidar that scans are taken to come from; empty until its scans have told it.
   void set_sensor(const std::string& name);
@@ -85,6 +87,7 @@ class Statistics {
   /// Why the last save of the map failed; empty once a later one succeeded.
   [[nodiscard]] std::string last_save_failure() const;
   [[nodiscard]] std::string map_displaced() const;
+  [[nodiscard]] std::string maps_left() const;
   [[nodiscard]] std::string place_search() const;
   /// Why the last segmentation failed; empty once a later one worked.
   [[nodiscard]] std::string last_segmentation_failure() const;
@@ -120,6 +123,7 @@ class Statistics {
   std::string last_segmentation_failure_;
   std::string last_save_failure_;
   std::string map_displaced_;
+  std::string maps_left_;
   std::string sensor_;
   std::string place_search_;
 };

@@ -146,9 +146,11 @@ std::string ServerReport::reason(const dds::ServerStatus& status) const {
   if (const std::string failure = statistics_.last_save_failure(); !failure.empty()) {
     return "the map cannot be saved, what is mapped is in memory alone: " + failure;
   }
-  const std::string fault = mapping_fault(status);
-  const std::string displaced = statistics_.map_displaced();
-  return fault.empty() || displaced.empty() ? fault + displaced : fault + "; " + displaced;
+  std::string all = mapping_fault(status);
+  for (const std::string& told : {statistics_.map_displaced(), statistics_.maps_left()}) {
+    if (!told.empty()) all += (all.empty() ? "" : "; ") + told;
+  }
+  return all;
 }
 
 std::string ServerReport::mapping_fault(const dds::ServerStatus& status) const {

@@ -1,6 +1,9 @@
 #include "core/map/storage/fresh_map_file.hpp"
 
+#include <SQLiteCpp/Backup.h>
+#include <SQLiteCpp/Database.h>
 #include <gmock/gmock.h>
+#include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -88,18 +91,59 @@ TEST_F(FreshMapFileTest, GoesWhereItDidNotTakeThePlace) {
   EXPECT_TRUE(names().empty());
 }
 
-TEST_F(FreshMapFileTest, WhatAKilledProcessLeftGoesWhenTheFileIsLocked) {
+TEST_F(FreshMapFileTest, PartsThatAKilledProcessLeftGoWhereAFileHasTheName) {
   for (const char* name : {"city.stillmap.new-letter", "city.stillmap.new-diary/a.txt",
                            "city.stillmap.new-backup/a.txt", "town.stillmap.new-1aB2cD/a.txt"}) {
     static_cast<void>(folder_.file(name, "mine"));
   }
-  const std::set<std::string> before = names();
+  std::set<std::string> before = names();
   die_while_writing();
   die_while_writing();
   ASSERT_EQ(names().size(), before.size() + 2);
-  { const MapLock lock(file_); }
+  remove_useless_fresh_files(file_);
+  EXPECT_EQ(names().size(), before.size() + 2) << "they may be all that is left of it";
+  static_cast<void>(open_map_file(file_));
+  remove_useless_fresh_files(file_);
+  before.insert("city.stillmap");
   EXPECT_EQ(names(), before);
   EXPECT_EQ(content_of(folder_ / "city.stillmap.new-backup/a.txt"), "mine");
+}
+
+TEST_F(FreshMapFileTest, WhatHoldsNoMapGoes) {
+  const FreshMapFile fresh(file_);
+  static_cast<void>(open_map_file(fresh.path()));
+  ASSERT_EQ(left_fresh_files(file_).size(), 1U);
+  EXPECT_EQ(left_content(left_fresh_files(file_).front()), LeftContent::none);
+  remove_useless_fresh_files(file_);
+  EXPECT_TRUE(names().empty());
+}
+
+/// SQLite, asked to open it, would take all of it back.
+TEST_F(FreshMapFileTest, ACopyThatWasCutOffIsAPart) {
+  const fs::path source = folder_ / "source.stillmap";
+  open_map_file(source)->save(test::saved_map(1));
+  for (const bool is_finished : {false, true}) {
+    const pid_t child = fork();
+    if (child == 0) {
+      const FreshMapFile fresh(file_);
+      SQLite::Database from(source.string(), SQLite::OPEN_READONLY);
+      SQLite::Database to(fresh.path().string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+      to.exec("PRAGMA cache_size = 4");
+      SQLite::Backup copy(to, from);
+      const int half = static_cast<int>(fs::file_size(source) / 2048);
+      static_cast<void>(copy.executeStep(is_finished ? -1 : half));
+      kill(getpid(), SIGKILL);
+    }
+    waitpid(child, nullptr, 0);
+    const std::vector<LeftFreshFile> left = left_fresh_files(file_);
+    ASSERT_EQ(left.size(), 1U);
+    ASSERT_GT(fs::file_size(left.front().path), 0U);
+    const std::string content = content_of(left.front().path);
+    EXPECT_EQ(left_content(left.front()),
+              is_finished ? LeftContent::whole : LeftContent::unfinished);
+    EXPECT_EQ(content_of(left.front().path), content);
+    remove_fresh_file(left.front());
+  }
 }
 
 TEST_F(FreshMapFileTest, AMapThatHasTheNameOfTheLockIsNoLock) {
@@ -118,9 +162,19 @@ TEST_F(FreshMapFileTest, WhatWasToLieBesideTheFileIsNamedAndStays) {
     open_map_file(fresh->path())->save(test::saved_map(1));
   static_cast<void>(folder_.file("city.1.stillmap.new-letter", "mine"));
   static_cast<void>(folder_.file("city.2.stillmap.new-backup/a.txt", "mine"));
-  { const MapLock lock(file_); }
-  EXPECT_FALSE(fs::exists(own.path()));
-  EXPECT_EQ(fresh_files_beside(file_), std::vector<fs::path>{dated.path()});
+  const std::vector<LeftFreshFile> left = left_fresh_files(file_);
+  ASSERT_EQ(left.size(), 1U);
+  EXPECT_EQ(left.front().path, own.path());
+  EXPECT_EQ(left.front().name, file_);
+  const std::vector<LeftFreshFile> beside = left_fresh_files_beside(file_);
+  ASSERT_EQ(beside.size(), 1U);
+  EXPECT_EQ(beside.front().path, dated.path());
+  remove_useless_fresh_files(file_);
+  EXPECT_EQ(left_content(left.front()), LeftContent::whole);
+  ASSERT_TRUE(keep_fresh_file(left.front(), file_));
+  test::expect_equal(open_map_file(file_)->load(), test::saved_map(1));
+  EXPECT_FALSE(keep_fresh_file(beside.front(), file_));
+  EXPECT_TRUE(fs::exists(dated.path()));
 }
 
 }  // namespace

@@ -136,6 +136,7 @@ ExitCode run(const MergeArguments& arguments) {
   end_cleanly_when_stopped();
   // Until the result is written, nobody else puts a map there.
   const MapLock lock(arguments.out);
+  remove_useless_fresh_files(arguments.out);
   check_out(arguments);
   const StaticMapConfig rule = arguments.config_file.empty()
                                    ? StaticMapConfig{}

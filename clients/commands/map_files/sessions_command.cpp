@@ -9,6 +9,7 @@
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
+#include "core/map/storage/fresh_map_file.hpp"
 #include "core/map/storage/map_lock.hpp"
 #include "core/map/storage/map_sessions.hpp"
 
@@ -93,6 +94,7 @@ ExitCode run(const SessionsArguments& arguments) {
   std::vector<MapSession> sessions = read_map_sessions(arguments.file);
   if (arguments.withdraw != 0) {
     const MapLock lock(arguments.out);
+    remove_useless_fresh_files(arguments.out);
     check_withdrawal(arguments, sessions);
     withdraw_newest_session(arguments.file, arguments.out);
     sessions.pop_back();

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/dataset/dataset_error.hpp"
+#include "core/map/storage/fresh_map_file.hpp"
 #include "core/map/storage/map_file.hpp"
 
 namespace stillmap::cli {
@@ -104,6 +105,7 @@ MapOutputFolder::MapOutputFolder(fs::path folder, const OutputPolicy& policy)
   check(folder_, run_file(), policy);
   make(folder_);
   lock_ = std::make_unique<MapLock>(map_file);
+  remove_useless_fresh_files(map_file);
   // Another run may have ended before the lock was taken.
   check(folder_, run_file(), policy);
   had_map_ = fs::exists(map_file);

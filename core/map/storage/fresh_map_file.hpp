@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <vector>
 
@@ -23,14 +24,40 @@ class FreshMapFile {
   std::filesystem::path path_;
 };
 
-/// Removes what killed processes left of such folders. For who holds the lock of the file (MapLock)
-/// and has made none yet.
-void remove_left_fresh_files(const std::filesystem::path& file);
+/// What a killed process left of a fresh map file.
+struct LeftFreshFile {
+  std::filesystem::path path;
+  /// The file that it was to become.
+  std::filesystem::path name;
+};
 
-/// The fresh files that were to be put beside `file` under a longer name, as that of
-/// "city.2026-05-31_142500.stillmap" beside "city.stillmap". A process that was killed left them,
-/// or one makes them now; each may be whole.
-[[nodiscard]] std::vector<std::filesystem::path> fresh_files_beside(
-    const std::filesystem::path& file);
+/// Those of this file, the newest first. For who holds its lock (MapLock) and has made none yet.
+[[nodiscard]] std::vector<LeftFreshFile> left_fresh_files(const std::filesystem::path& file);
+
+/// Those of files beside `file` under a longer name, as of "city.2026-05-31_142500.stillmap" beside
+/// "city.stillmap". Another process may be making one now: then it holds the lock of its name.
+[[nodiscard]] std::vector<LeftFreshFile> left_fresh_files_beside(const std::filesystem::path& file);
+
+/// How much of a map is in what was left.
+enum class LeftContent : std::uint8_t {
+  none,
+  /// A part, or something that cannot be read.
+  unfinished,
+  whole
+};
+/// Reads all of the file, and leaves a part as it is: SQLite, once it opens it, would take back
+/// what was not finished.
+[[nodiscard]] LeftContent left_content(const LeftFreshFile& left);
+
+/// Gives a whole one this name; false where a file has it. Throws
+/// std::filesystem::filesystem_error.
+[[nodiscard]] bool keep_fresh_file(const LeftFreshFile& left, const std::filesystem::path& name);
+
+/// Removes it with its folder.
+void remove_fresh_file(const LeftFreshFile& left);
+
+/// Removes those of `file` that are of no use to anybody: without content, and, where a file has
+/// the name, parts of what was to replace it. For who is about to write `file`, under its lock.
+void remove_useless_fresh_files(const std::filesystem::path& file);
 
 }  // namespace stillmap

@@ -12,7 +12,6 @@
 #include <sstream>
 #include <string>
 
-#include "core/map/storage/fresh_map_file.hpp"
 #include "core/map/storage/map_database.hpp"
 
 namespace stillmap {
@@ -103,10 +102,7 @@ MapLock::MapLock(const fs::path& map_file) : lock_file_(beside(real_file(map_fil
   const bool is_named =
       ::ftruncate(descriptor_, 0) == 0 &&
       ::pwrite(descriptor_, holder.data(), holder.size(), 0) == static_cast<ssize_t>(holder.size());
-  if (is_named) {
-    remove_left_fresh_files(map_file);
-    return;
-  }
+  if (is_named) return;
   const std::string why = std::strerror(errno);
   std::error_code ignored;
   fs::remove(lock_file_, ignored);

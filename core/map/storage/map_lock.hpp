@@ -14,8 +14,7 @@ class MapFileInUseError : public MapFileError {
 
 /// Who writes a map file: one process at a time. The file "NAME.lock" beside it names the holder,
 /// as "host pid", and is locked (flock) as long as the holder lives: a lock that a killed process
-/// left behind is taken over, and what it left of a fresh map file (FreshMapFile) removed. Programs
-/// that only read need none.
+/// left behind is taken over. Programs that only read need none.
 class MapLock {
  public:
   /// Throws MapFileInUseError that names the holder, or MapFileError when the lock file cannot be
