@@ -120,12 +120,16 @@ void MapSaver::tell_where_name_leads() {
 }
 
 void MapSaver::move_to(const fs::path& target, std::unique_ptr<MapLock> target_lock) {
-  const bool is_configured = file_ == configured_file_;
+  const fs::path name = file_;
   leave_store_for(target);
+  follow_to(target, name);
+  if (target_lock) lock_ = std::move(target_lock);
+}
+
+void MapSaver::follow_to(const fs::path& target, const fs::path& name) {
   // Where a reset can rename it.
   folder_ = folder_.of(target);
-  if (is_configured) configured_file_ = target;
-  if (target_lock) lock_ = std::move(target_lock);
+  if (name == configured_file_) configured_file_ = target;
 }
 
 bool MapSaver::follow_name() {

@@ -307,8 +307,9 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
   // It belongs under the name that the saver is about to leave.
   if (misplaced_) bring_back();
   look_after_file_first();
-  fs::path target =
-      name.empty() && left_file_ && is_left_file_loaded_ ? *left_file_ : file_named(name);
+  // A link may have taken that name meanwhile.
+  const bool is_left_file = name.empty() && left_file_ && is_left_file_loaded_;
+  fs::path target = is_left_file ? real_file(*left_file_) : file_named(name);
   refuse_to_lose();
   const bool is_own = target == file_;
   auto target_lock = is_own ? nullptr : std::make_unique<MapLock>(target);
@@ -337,6 +338,9 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
     file_ = target;
     store_ = std::move(store);
     lock_ = std::move(target_lock);
+  }
+  if (is_left_file) follow_to(target, *left_file_);
+  if (is_left_file || !is_own) {
     left_file_.reset();
     statistics_.set_map_displaced({});
   }

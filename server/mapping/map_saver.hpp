@@ -208,6 +208,8 @@ class MapSaver {
   /// that name leads to. False where neither is there.
   [[nodiscard]] bool follow_name();
   void move_to(const std::filesystem::path& target, std::unique_ptr<MapLock> target_lock);
+  /// From now on the map's file, and what is kept beside it, is where `name` leads.
+  void follow_to(const std::filesystem::path& target, const std::filesystem::path& name);
   /// A file that was made beside the map's name, and never got anything to hold.
   void remove_if_empty(const std::filesystem::path& made_beside);
   /// Tiles that were in the file alone are lost with its content.

@@ -455,5 +455,24 @@ TEST_F(DisplacedMapFile, WhatIsInMemoryStaysThereWhereItsFileIsGone) {
   EXPECT_THAT(tiles_in(saver_.save_as("")), testing::ElementsAre(0, 1, 2));
 }
 
+TEST_F(DisplacedMapFile, ALoadWithoutANameFollowsALinkThatHasTheName) {
+  const ScratchFolder disk;
+  put_back();
+  map_scan(30.0F);
+  saver_.save_if_changed();
+  fs::rename(file_, disk / "city.stillmap");
+  fs::create_symlink(disk / "city.stillmap", file_);
+  EXPECT_EQ(load(""), disk / "city.stillmap");
+  EXPECT_EQ(statistics_.map_displaced(), "");
+  const NewMap begun =
+      saver_.begin_anew(false, [this](auto id, const auto& tiles) { begin(id, tiles); });
+  EXPECT_EQ(begun.kept_file.parent_path(), disk.path());
+  EXPECT_THAT(tiles_in(begun.kept_file), testing::ElementsAre(2));
+  EXPECT_EQ(fs::read_symlink(file_), disk / "city.stillmap") << "the link is not renamed";
+  EXPECT_TRUE(is_map_file(disk / "city.stillmap"));
+  saver_.save_if_changed();
+  EXPECT_EQ(statistics_.map_displaced(), "");
+}
+
 }  // namespace
 }  // namespace stillmap::server
