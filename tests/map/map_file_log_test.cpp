@@ -179,6 +179,38 @@ TEST(MapFileFates, APipeUnderItsNameIsNotWaitedFor) {
   EXPECT_FALSE(store->is_same_under_name());
 }
 
+TEST(MapFileFates, AReaderOfTilesThatClosesLastDoesNotBringAnAbandonedLogIn) {
+  for (const bool is_abandoned : {true, false}) {
+    const ScratchFolder folder;
+    const fs::path file = folder / "map.stillmap", backup = folder / "backup.stillmap";
+    open_map_file(backup)->save(test::saved_map(3));
+    auto store = open_map_file(file);
+    store->save(test::saved_map(1));
+    auto tiles = store->tile_store();
+    static_cast<void>(tiles->load({0, 0}));
+    {
+      SQLite::Database reader(file.string(), SQLite::OPEN_READONLY);
+      reader.exec("BEGIN");
+      static_cast<void>(reader.execAndGet("SELECT count(*) FROM tiles").getInt());
+      store->save(test::saved_map(2));
+    }
+    ASSERT_GT(fs::file_size(file.string() + "-wal"), 32U);
+    const std::string content = content_of(backup);
+    if (is_abandoned) {
+      std::ofstream(file, std::ios::binary | std::ios::trunc) << content;
+      static_cast<void>(store->abandon());
+    }
+    store.reset();
+    tiles.reset();
+    if (is_abandoned) {
+      EXPECT_EQ(content_of(file), content);
+    } else {
+      EXPECT_FALSE(fs::exists(file.string() + "-wal"));
+      test::expect_equal(open_map_file(file)->load(), test::saved_map(2));
+    }
+  }
+}
+
 TEST(MapFileFates, AnUpgradeIsNoOthersWork) {
   const ScratchFolder folder;
   const fs::path file = folder / "map.stillmap";

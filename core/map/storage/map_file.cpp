@@ -7,9 +7,8 @@
 #include <SQLiteCpp/Transaction.h>
 #include <sqlite3.h>
 
-#include <algorithm>
-#include <condition_variable>
-#include <mutex>
+#include <atomic>
+#include <memory>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -21,6 +20,7 @@
 #include "core/map/storage/map_tables.hpp"
 #include "core/map/storage/save_marks.hpp"
 #include "core/map/storage/session_tables.hpp"
+#include "core/map/storage/sqlite_tile_store.hpp"
 #include "core/map/storage/tile_codec.hpp"
 #include "core/process/temporary_folder.hpp"
 
@@ -28,11 +28,6 @@ namespace stillmap {
 namespace {
 
 namespace fs = std::filesystem;
-
-MapFileError unreadable(const fs::path& file, const std::runtime_error& error) {
-  return {file, std::string("cannot be read (") + error.what() +
-                    "); restore a copy or name another file"};
-}
 
 /// The name that links lead to, whether or not a file has it: a file that is made there would
 /// otherwise take the link's place.
@@ -62,65 +57,6 @@ std::shared_ptr<const TemporaryFolder> scratch_folder() {
     throw MapFileError(error.path1(), "cannot be made; set TMPDIR to a folder that can be written");
   }
 }
-
-/// Reads through connections of its own, so that readers wait neither for a save nor for each
-/// other. All are opened at once: the file may lie under another name later, and another map under
-/// this.
-class SqliteTileStore : public TileStore {
- public:
-  SqliteTileStore(const fs::path& file, std::shared_ptr<const TemporaryFolder> folder)
-      : folder_(std::move(folder)), file_(file) {
-    connections_.reserve(max_readers);
-    while (connections_.size() < max_readers) {
-      connections_.push_back(connect_to_map_database(file));
-    }
-    for (SQLite::Database& connection : connections_) idle_.push_back(&connection);
-  }
-
-  TileRecord load(TileId id) override {
-    const Use use(*this);
-    try {
-      const SQLite::Transaction one_state(*use.database);
-      return read_record(*use.database, id, read_map_row(*use.database));
-    } catch (const std::runtime_error& error) {
-      throw unreadable(file_, error);
-    }
-  }
-
- private:
-  /// The mapper, the search for loops, the publishers of tiles and of the cloud, traversability,
-  /// and the six services that read tiles: none waits.
-  static constexpr std::size_t max_readers = 11;
-
-  /// A connection that no other reader has.
-  struct Use {
-    explicit Use(SqliteTileStore& its_store) : store(its_store) {
-      std::unique_lock lock(store.mutex_);
-      store.given_back_.wait(lock, [&] { return !store.idle_.empty(); });
-      database = store.idle_.back();
-      store.idle_.pop_back();
-    }
-    ~Use() {
-      {
-        const std::scoped_lock lock(store.mutex_);
-        store.idle_.push_back(database);
-      }
-      store.given_back_.notify_one();
-    }
-    Use(const Use&) = delete;
-    Use& operator=(const Use&) = delete;
-
-    SqliteTileStore& store;
-    SQLite::Database* database = nullptr;
-  };
-
-  std::shared_ptr<const TemporaryFolder> folder_;
-  fs::path file_;
-  std::mutex mutex_;
-  std::condition_variable given_back_;
-  std::vector<SQLite::Database> connections_;
-  std::vector<SQLite::Database*> idle_;
-};
 
 class SqliteMapStore : public MapStore {
  public:
@@ -179,7 +115,7 @@ class SqliteMapStore : public MapStore {
   }
 
   std::shared_ptr<TileStore> tile_store() override {
-    return std::make_shared<SqliteTileStore>(file_, folder_);
+    return std::make_shared<SqliteTileStore>(file_, folder_, is_log_abandoned_);
   }
 
   void begin_run(std::uint64_t map_id, const RunSession& said) override {
@@ -255,6 +191,7 @@ class SqliteMapStore : public MapStore {
   bool is_same_under_name() override { return watch_.is_same_under_name(); }
 
   std::function<void()> abandon() override {
+    *is_log_abandoned_ = true;
     sqlite3_db_config(database_.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
     return watch_.log_removal();
   }
@@ -446,6 +383,8 @@ class SqliteMapStore : public MapStore {
   /// SQLite's, of that time: it changes with what other connections write.
   std::int64_t data_version_ = -1;
   bool log_is_empty_ = false;
+  /// For readers of tiles, which may be the last to close.
+  std::shared_ptr<std::atomic<bool>> is_log_abandoned_ = std::make_shared<std::atomic<bool>>(false);
 };
 
 }  // namespace
@@ -487,7 +426,7 @@ void replace_map_file(const fs::path& fresh, const fs::path& file) {
 }
 
 std::shared_ptr<TileStore> open_tile_store(const fs::path& file) {
-  return std::make_shared<SqliteTileStore>(real_file(file), nullptr);
+  return std::make_shared<SqliteTileStore>(real_file(file));
 }
 
 std::unique_ptr<MapStore> open_scratch_map() {
