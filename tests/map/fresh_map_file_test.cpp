@@ -2,8 +2,10 @@
 
 #include <SQLiteCpp/Backup.h>
 #include <SQLiteCpp/Database.h>
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <signal.h>
+#include <sys/file.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -153,6 +155,23 @@ TEST_F(FreshMapFileTest, AMapThatHasTheNameOfTheLockIsNoLock) {
               testing::AllOf(testing::StartsWith(file_.string()),
                              testing::HasSubstr(other.string() + " is something else")));
   test::expect_equal(open_map_file(other)->load(), test::saved_map(1));
+}
+
+/// On a file system whose inode numbers change, and not where somebody copied the lock.
+TEST_F(FreshMapFileTest, ALockThatIsLockedAndSaysItsOwnIsHeld) {
+  const MapLock lock(file_);
+  ASSERT_TRUE(lock.is_held());
+  const std::string name = file_.string() + ".lock", own = content_of(name);
+  fs::remove(name);
+  EXPECT_FALSE(lock.is_held());
+  std::ofstream(name) << own;
+  EXPECT_FALSE(lock.is_held());
+  const int descriptor = open(name.c_str(), O_RDWR);
+  ASSERT_EQ(flock(descriptor, LOCK_EX), 0);
+  EXPECT_TRUE(lock.is_held());
+  std::ofstream(name) << own.substr(0, own.rfind(' ')) << " 1234";
+  EXPECT_FALSE(lock.is_held()) << "another one of this process";
+  close(descriptor);
 }
 
 TEST_F(FreshMapFileTest, WhatWasToLieBesideTheFileIsNamedAndStays) {

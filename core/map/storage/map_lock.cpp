@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <random>
 #include <sstream>
 #include <string>
 
@@ -25,7 +26,7 @@ std::string host_name() {
   return name.data();
 }
 
-/// Of a host name and a process at most; a larger file of that name is no lock.
+/// Of a host name, a process and a token at most; a larger file of that name is no lock.
 constexpr off_t max_lock_bytes = 511;
 
 struct Holder {
@@ -67,6 +68,29 @@ MapFileError not_a_lock(const fs::path& map_file, const fs::path& lock_file) {
                         " is something else than a lock; move that, or name another file"};
 }
 
+/// Of this lock and no other one.
+std::string new_token() {
+  std::random_device entropy;
+  std::ostringstream token;
+  token << std::hex << entropy() << entropy();
+  return token.str();
+}
+
+/// Whether the file of that name is locked, and says what this lock has written: then it is this
+/// one, on a file system whose inode numbers change.
+bool is_own_under_name(const fs::path& lock_file, const std::string& written) {
+  const int descriptor = ::open(lock_file.c_str(), O_RDWR | O_CLOEXEC);
+  if (descriptor < 0) return false;
+  // One that is not locked was copied there, and another process could take it.
+  const bool is_locked = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0;
+  std::string text(written.size() + 1, '\0');
+  const ssize_t bytes = ::pread(descriptor, text.data(), text.size(), 0);
+  ::close(descriptor);
+  if (!is_locked || bytes != static_cast<ssize_t>(written.size())) return false;
+  text.resize(written.size());
+  return text == written;
+}
+
 /// Whether the open file is the one of that name.
 bool has_name(int descriptor, const fs::path& name, struct stat& opened) {
   struct stat named {};
@@ -96,12 +120,13 @@ int try_lock(const fs::path& lock_file, const fs::path& map_file) {
 }  // namespace
 
 // Of the file that a link leads to: two names of one map have one lock.
-MapLock::MapLock(const fs::path& map_file) : lock_file_(beside(real_file(map_file), ".lock")) {
+MapLock::MapLock(const fs::path& map_file)
+    : lock_file_(beside(real_file(map_file), ".lock")),
+      holder_(host_name() + " " + std::to_string(::getpid()) + " " + new_token() + "\n") {
   while (descriptor_ < 0) descriptor_ = try_lock(lock_file_, map_file);
-  const std::string holder = host_name() + " " + std::to_string(::getpid()) + "\n";
-  const bool is_named =
-      ::ftruncate(descriptor_, 0) == 0 &&
-      ::pwrite(descriptor_, holder.data(), holder.size(), 0) == static_cast<ssize_t>(holder.size());
+  const bool is_named = ::ftruncate(descriptor_, 0) == 0 &&
+                        ::pwrite(descriptor_, holder_.data(), holder_.size(), 0) ==
+                            static_cast<ssize_t>(holder_.size());
   if (is_named) return;
   const std::string why = std::strerror(errno);
   std::error_code ignored;
@@ -112,7 +137,7 @@ MapLock::MapLock(const fs::path& map_file) : lock_file_(beside(real_file(map_fil
 
 bool MapLock::is_held() const {
   struct stat opened {};
-  return has_name(descriptor_, lock_file_, opened);
+  return has_name(descriptor_, lock_file_, opened) || is_own_under_name(lock_file_, holder_);
 }
 
 MapLock::~MapLock() {
