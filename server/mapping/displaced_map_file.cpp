@@ -247,23 +247,18 @@ void MapSaver::leave_store_for(const fs::path& target, bool is_log_of_another) {
 }
 
 void MapSaver::leave_out_lost_tiles(SavedMap& map) {
-  if (std::exchange(is_memory_alone_, false)) {
-    for (const auto& tile : map.view.tiles) {
-      if (is_non_resident(*tile)) lost_tiles_.push_back(tile->info.id);
-    }
-    if (!lost_tiles_.empty()) {
-      spdlog::error("{} tiles of the running map were in the overwritten file alone, and are lost",
-                    lost_tiles_.size());
-    }
-    source_->forget_lost_tiles();
+  if (!std::exchange(is_memory_alone_, false)) return;
+  std::vector<TileTable::Edit> lost;
+  for (const auto& tile : map.view.tiles) {
+    if (is_non_resident(*tile)) lost.push_back({tile->info.id, nullptr});
   }
-  std::vector<TileTable::Edit> edits;
-  for (const TileId id : lost_tiles_) {
-    // It may have been mapped anew.
-    const auto tile = map.view.tiles.find(id);
-    if (tile && is_non_resident(*tile)) edits.push_back({id, nullptr});
+  if (!lost.empty()) {
+    spdlog::error("{} tiles of the running map were in the overwritten file alone, and are lost",
+                  lost.size());
+    map.view.tiles = map.view.tiles.with(lost);
   }
-  if (!edits.empty()) map.view.tiles = map.view.tiles.with(edits);
+  // Later checkpoints have none of them any more.
+  source_->forget_lost_tiles();
 }
 
 }  // namespace stillmap::server

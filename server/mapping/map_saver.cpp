@@ -220,8 +220,6 @@ bool MapSaver::store(CheckpointScope scope, bool has_ended) {
     throw MapFileError(file_, "was overwritten just now; nothing was written to it");
   }
   const std::uint64_t bytes = file.save(checkpoint.map);
-  // Mapped anew, and in the file again.
-  std::erase_if(lost_tiles_, [&](TileId id) { return checkpoint.map.tile_evidence.contains(id); });
   source_->checkpoint_stored(checkpoint.step);
   remember_as_saved(checkpoint.map.view, poses);
   if (is_standing) standing_allowance_.spend(bytes);
@@ -345,7 +343,6 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
     statistics_.set_map_displaced({});
   }
   statistics_.map_saved(took.count());
-  lost_tiles_.clear();
   is_memory_alone_ = false;
   remember_metadata(map);
   remember_as_saved(*latest_map_.view(), latest_map_.poses_added());
@@ -380,7 +377,6 @@ NewMap MapSaver::begin_anew(bool discard, const BeginMap& begin) {
   tiles_ = tiles;
   is_session_ = false;
   saved_map_id_ = 0;
-  lost_tiles_.clear();
   is_memory_alone_ = false;
   // What lies there was never this map's.
   is_left_file_loaded_ = false;

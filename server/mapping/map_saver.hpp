@@ -286,7 +286,6 @@ class MapSaver {
   bool has_ended_ = false;
   /// The file's content is gone, and nothing was saved since.
   bool is_memory_alone_ = false;
-  std::vector<TileId> lost_tiles_;
   ThrottledLog throttled_log_;
   /// The map without a file that was saved under a name last.
   std::uint64_t copied_map_id_ = 0;
