@@ -73,6 +73,7 @@ std::optional<FileState> FileReference::state() const {
 MapFileWatch::MapFileWatch(fs::path file, SQLite::Database& database)
     : file_(std::move(file)),
       opened_(file_),
+      writers_(file_),
       was_moved_(has_moved(database)),
       is_partly_written_(!has_empty_log()) {
   remember(database);
@@ -112,12 +113,22 @@ MapFileFate MapFileWatch::fate(SQLite::Database& database) {
       look(database);
       is_partly_written_ |= !has_empty_log();
     }
+    check_pages_after_others();
     if (is_others_) return MapFileFate::overwritten;
     return is_own_content(has_empty_log()) ? MapFileFate::kept : MapFileFate::overwritten;
   } catch (const SQLite::Exception& error) {
     if (is_of_content(error)) return MapFileFate::overwritten;
     throw not_visible(file_, error.what());
   }
+}
+
+void MapFileWatch::check_pages_after_others() {
+  is_doubtful_ |= writers_.has_one_closed();
+  if (!is_doubtful_ || is_others_) return;
+  // With its log; opened for writing, this would be one more of the others.
+  SQLite::Database alone(sqlite_name(file_), SQLite::OPEN_READONLY);
+  is_others_ = alone.execAndGet("PRAGMA integrity_check(1)").getString() != "ok";
+  is_doubtful_ = false;
 }
 
 bool MapFileWatch::has_own_name() const {

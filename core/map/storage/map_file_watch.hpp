@@ -11,6 +11,7 @@
 #include "core/map/storage/map_file.hpp"
 #include "core/map/storage/read_lease.hpp"
 #include "core/map/storage/save_marks.hpp"
+#include "core/map/storage/writer_watch.hpp"
 
 namespace stillmap {
 
@@ -77,9 +78,15 @@ class MapFileWatch {
   };
   /// Throws SQLite::Exception.
   void look(SQLite::Database& database);
+  /// Of a file that another process may have written to: a copy that met the moment in which a log
+  /// was written into the file has the newest mark, and pages of both.
+  void check_pages_after_others();
 
   std::filesystem::path file_;
   FileReference opened_;
+  WriterWatch writers_;
+  /// One had it open, and what is in it was not checked since.
+  bool is_doubtful_ = false;
   /// The name was another file's by then.
   bool was_moved_;
   /// A log that was there at first, or was changed by others, may have been written in part.
