@@ -24,16 +24,16 @@ void insert_scan(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_li
 }
 
 void LendableMap::insert(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar) {
-  if (!is_lent_ && kept_.empty()) return insert_scan(labelled, T_map_lidar, sensor_, map_);
-  kept_.push_back({labelled, T_map_lidar});
+  if (!is_lent_ && kept_.empty()) return insert_scan(labelled, T_map_lidar, *sensor_, map_);
+  kept_.push_back({{labelled, T_map_lidar}, sensor_});
 }
 
 void LendableMap::let_wait(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar) {
-  waiting_.add({labelled, T_map_lidar}, T_map_lidar.translation(), labelled.scan.size());
+  waiting_.add({{labelled, T_map_lidar}, sensor_}, T_map_lidar.translation(), labelled.scan.size());
 }
 
 std::size_t LendableMap::decide_waiting(MapEntry entry, bool later) {
-  std::vector<PosedScan> entering = waiting_.decided_by(entry);
+  std::vector<Kept> entering = waiting_.decided_by(entry);
   std::ranges::move(entering, std::back_inserter(confirmed_));
   if (!later && !is_lent_) insert_confirmed();
   return entering.size();
@@ -45,19 +45,19 @@ StaticMap& LendableMap::lend() {
   return map_;
 }
 
-void LendableMap::insert_some(std::deque<PosedScan>& scans, std::size_t max_scans) {
+void LendableMap::insert_some(std::deque<Kept>& scans, std::size_t max_scans) {
   assert(!is_lent_);
   for (; max_scans > 0 && !scans.empty(); --max_scans) {
-    const PosedScan scan = std::move(scans.front());
+    const Kept scan = std::move(scans.front());
     scans.pop_front();
-    insert_scan(scan.labelled, scan.T_map_lidar, sensor_, map_);
+    insert_scan(scan.posed.labelled, scan.posed.T_map_lidar, *scan.sensor, map_);
   }
 }
 
 void LendableMap::correct(const MapCorrection& correction) {
   for (auto* const scans : {&kept_, &confirmed_})
-    for (PosedScan& scan : *scans) scan.correct(correction);
-  waiting_.for_each([&](PosedScan& scan) { scan.correct(correction); });
+    for (Kept& scan : *scans) scan.posed.correct(correction);
+  waiting_.for_each([&](Kept& scan) { scan.posed.correct(correction); });
 }
 
 StaticMap& LendableMap::map() {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <deque>
 #include <limits>
+#include <memory>
 
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/sensor_model.hpp"
@@ -33,11 +34,13 @@ void insert_scan(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_li
 class LendableMap {
  public:
   LendableMap(const StaticMapConfig& config, const SensorModel& sensor)
-      : map_(config), sensor_(sensor) {}
+      : map_(config), sensor_(std::make_shared<const SensorModel>(sensor)) {}
 
   void insert(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar);
-  /// Of the next scans.
-  void use_sensor(const SensorModel& sensor) { sensor_ = sensor; }
+  /// Of the next scans; those that are kept or wait are of the one before.
+  void use_sensor(const SensorModel& sensor) {
+    sensor_ = std::make_shared<const SensorModel>(sensor);
+  }
   /// A scan of MapEntry::waits.
   void let_wait(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar);
   /// What becomes of those by the entry of the next scan, before that is inserted: they are
@@ -74,14 +77,19 @@ class LendableMap {
   [[nodiscard]] const StaticMap* readable() const { return is_lent_ ? nullptr : &map_; }
 
  private:
-  void insert_some(std::deque<PosedScan>& scans, std::size_t max_scans);
+  /// A scan, and the lidar that it is of.
+  struct Kept {
+    PosedScan posed;
+    std::shared_ptr<const SensorModel> sensor;
+  };
+  void insert_some(std::deque<Kept>& scans, std::size_t max_scans);
 
   StaticMap map_;
-  SensorModel sensor_;
+  std::shared_ptr<const SensorModel> sensor_;
   bool is_lent_ = false;
-  std::deque<PosedScan> kept_;
-  std::deque<PosedScan> confirmed_;
-  WaitingScans<PosedScan> waiting_;
+  std::deque<Kept> kept_;
+  std::deque<Kept> confirmed_;
+  WaitingScans<Kept> waiting_;
 };
 
 }  // namespace stillmap
