@@ -163,6 +163,11 @@ TEST(ServerConfig, TakesRelativePathsFromTheFilesFolder) {
   EXPECT_EQ(config.labels.model, "/models/a");
 }
 
+TEST(ServerConfig, AMapFileWithoutANameIsNone) {
+  EXPECT_EQ(load("map: {file: \"\"}\n").map.file, "");
+  EXPECT_EQ(load("map:\n  file:\n").map.file, "");
+}
+
 TEST(ServerConfig, KeepsDefaultsOfASectionThatIsCommentedOut) {
   EXPECT_EQ(load("publish:\n  # scan: false\n").publish.scan, true);
 }
