@@ -79,6 +79,31 @@ TEST_F(DisplacedMapService, LoadsABackupThatWasPutInTheFilesPlaceAndKeepsTheRunn
   EXPECT_EQ(poses_in(setup_.map_file()), 10U);
 }
 
+TEST_F(DisplacedMapService, ResumesWhatAKilledServerWasWritingInPlaceOfItsFile) {
+  server_.send(SIGKILL);
+  ASSERT_NE(server_.wait_for_exit(patience), 0);
+  const std::string file = setup_.map_file();
+  const fs::path whole = file + ".new-1aB2cD/unfinished.stillmap";
+  const fs::path part = setup_.map_file().parent_path() /
+                        "map.2026-05-31_142500.stillmap.new-3cD4eF/unfinished.stillmap";
+  for (const fs::path& left : {whole, part}) fs::create_directory(left.parent_path());
+  fs::copy_file(file, part);
+  fs::resize_file(part, fs::file_size(part) / 2);
+  fs::rename(file, whole);
+  {
+    ServerProcess next(setup_.server_arguments());
+    Client client(setup_.client());
+    client.wait_for_server(patience);
+    EXPECT_THAT(client.status().reason, testing::HasSubstr(part.string() + " is a part of a map"));
+    next.send(SIGTERM);
+    ASSERT_EQ(next.wait_for_exit(patience), 0);
+  }
+  EXPECT_EQ(poses_in(file), 12U);
+  EXPECT_FALSE(fs::exists(whole.parent_path()));
+  EXPECT_TRUE(fs::exists(part));
+  EXPECT_FALSE(fs::exists(file + "-wal")) << "a clean stop leaves the file alone";
+}
+
 TEST(LinkedMapFile, IsMadeWhereTheLinkLeads) {
   const ScratchFolder disk;
   const ServiceSetup setup("every");
