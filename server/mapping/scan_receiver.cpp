@@ -280,6 +280,7 @@ void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std:
   lidar->frame_read = frame;
   report_labels(*lidar, from_cloud.label_census);
   report(*lidar, cloud_changes, *scan);
+  report_frame(*lidar);
   if (sweeps_ != nullptr) return sweeps_->add(lidar->index, *std::move(scan), stop);
   queue_scan({*std::move(scan), frame, received,
               lidar->recognition ? lidar->recognition->sensor() : nullptr},
@@ -332,6 +333,17 @@ void ScanReceiver::report(Lidar& lidar, const std::string& cloud_changes, const 
                       misfit +
                           ": set 'sensor' in the configuration ('stillmap dataset sensor' "
                           "makes a sensor file from a recording)");
+}
+
+void ScanReceiver::report_frame(const Lidar& lidar) {
+  const bool is_told = lidar.recognition && lidar.recognition->sensor();
+  if (!is_told || lidar.frame_read == lidar.frame_told) return;
+  statistics_.count("clouds_of_another_frame");
+  throttled_log_.warn("frame", "clouds on " + topic_ + " are of the frame '" +
+                                   shown_name(lidar.frame_read) + "', and those of '" +
+                                   shown_name(lidar.frame_told) +
+                                   "' told which lidar it is: they are taken for that one's; where "
+                                   "it is another, start the server again, or name it (sensor)");
 }
 
 void ScanReceiver::recognise(Lidar& lidar, const Scan& scan) {

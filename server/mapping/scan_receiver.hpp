@@ -111,6 +111,8 @@ class ScanReceiver {
   void accept(const sensor_msgs::msg::PointCloud2& cloud, const std::stop_token& stop);
   /// Counts ids that SemanticKITTI does not have, and says once where its ids are none.
   void report_labels(const Lidar& lidar, const LabelCensus& census);
+  /// Counts clouds of another frame than that of those which told the lidar.
+  void report_frame(const Lidar& lidar);
   /// Logs changes of the cloud's layout, and now and then checks that scans fit the sensor model.
   void report(Lidar& lidar, const std::string& cloud_changes, const Scan& scan);
   /// By the scan, where it tells the lidar. Of two on one topic, none tells what the other is.

@@ -131,5 +131,23 @@ TEST(LabelsOfScans, AreDoubtedWhereTheyAreClassesOrMostlyUnknown) {
   EXPECT_TRUE(counts_labels({24, 26, 28, 30}, "labels_mostly_unknown"));
 }
 
+TEST(ToldLidar, CloudsOfAnotherFrameAreCounted) {
+  const ServiceSetup setup("every", "save_period_s: 3600", "sensor: auto");
+  const ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  ScanPublisherOptions options = setup.publisher(true);
+  std::uint64_t mapped = 0;
+  for (const char* frame : {"lidar", "velodyne"}) {
+    options.lidar_frame = frame;
+    ScanPublisher publisher(options);
+    EXPECT_TRUE(publisher.wait_for_subscriber(patience));
+    for (int i = 0; i < 3; ++i)
+      EXPECT_TRUE(publisher.publish(room_scan(static_cast<int>(mapped++)), {}, patience));
+    ASSERT_TRUE(wait_for_scans(client, mapped));
+    EXPECT_EQ(client.status().counter("clouds_of_another_frame"), mapped - 3) << frame;
+  }
+}
+
 }  // namespace
 }  // namespace stillmap::test
