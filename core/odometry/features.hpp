@@ -30,6 +30,8 @@ struct Features {
   /// Those of `points` that are aligned: on something that stands up, and on level ground.
   std::vector<std::uint32_t> upright_points;
   std::vector<std::uint32_t> level_points;
+  /// ring_tangents() of the scan for its `upright_points`; empty where they are not looked at.
+  std::vector<Eigen::Vector3f> point_tangents;
 };
 
 /// Whether a lidar's scans are registered by surfaces, as those without rings are, or by the edges

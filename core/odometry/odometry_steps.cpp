@@ -20,6 +20,9 @@ constexpr double max_relocalization_reach_m = 60.0;
 /// Motion is classified again where the pose is farther than this from the predicted one [m, rad].
 constexpr double reclassify_distance_m = 0.2;
 constexpr double reclassify_angle_rad = 0.01;
+/// Points of a ring to either side among which its direction is sought where walls are near: 0.3 m
+/// from one 2 m away, at a fifth of a degree each.
+constexpr std::size_t steps_on_near_walls = 40;
 
 }  // namespace
 
@@ -103,11 +106,12 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
 void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& prediction) const {
   parts.sparse_rings = is_by_surfaces && (has_sparse_rings(sensor) || is_map_young());
   const auto find_features = [&] {
-    if (!is_by_surfaces) {
-      parts.features = extract_features(parts.scan, config.features);
-      return;
-    }
-    parts.features = extract_surfaces(parts.scan, config.features);
+    parts.features = is_by_surfaces ? extract_surfaces(parts.scan, config.features)
+                                    : extract_features(parts.scan, config.features);
+    if (!fits.are_known() && !parts.scan.ring.empty())
+      parts.features.point_tangents =
+          ring_tangents(parts.scan, parts.features.upright_points, steps_on_near_walls);
+    if (!is_by_surfaces) return;
     // A young map, or one that was made earlier, has too few other points to go by.
     if (fits.are_known() && !parts.scan.ring.empty())
       parts.features.tangents = ring_tangents(parts.scan, parts.features.surfaces);

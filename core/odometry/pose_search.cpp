@@ -11,6 +11,7 @@
 #include "core/odometry/point_alignment.hpp"
 #include "core/odometry/relocalization.hpp"
 #include "core/odometry/scan_features.hpp"
+#include "core/odometry/telling_points.hpp"
 
 namespace stillmap {
 namespace {
@@ -285,6 +286,14 @@ OdometryResult judged_in_place(const OdometryResult& found, const Eigen::Isometr
   return result;
 }
 
+/// Whether the points align better there for where smooth walls' rings lie alone.
+bool is_denied_by_telling_points(const OdometryResult& found,
+                                 const Eigen::Isometry3d& T_map_lidar_other,
+                                 const FeatureSets& features, const LocalMap& map) {
+  return gain_of_telling_points(features, map.points, found.T_map_lidar, T_map_lidar_other,
+                                found.sweep_correction) < 1.0;
+}
+
 /// A pose that features found, or where the points align clearly better, as confirmed_at_start
 /// says.
 OdometryResult led_by_points(const OdometryResult& found, const FeatureSets& features,
@@ -304,6 +313,7 @@ OdometryResult led_by_points(const OdometryResult& found, const FeatureSets& fea
   // Whether traffic pulls the features shows where nothing holds the points.
   const double min_gain = 1.0 + min_first_gain * found.fit;
   if (agrees || aligned.fit < min_gain * fit_there) return found;
+  if (is_denied_by_telling_points(found, T_led, features, map)) return found;
   return judged_in_place(found, T_led, features, map, config);
 }
 
@@ -341,7 +351,9 @@ OdometryResult confirmed_by_points(const OdometryResult& found, const FeatureSet
     if (other.health == OdometryHealth::lost) continue;
     const bool without_movable = &opinion != &opinions.front();
     const SecondOpinion again(other, features, map, without_movable);
-    if (again.confirms() && again.aligned.fit > opinion.aligned.fit) return again.pose;
+    if (again.confirms() && again.aligned.fit > opinion.aligned.fit &&
+        !is_denied_by_telling_points(found, other.T_map_lidar, features, map))
+      return again.pose;
   }
   OdometryResult doubtful = opinions.front().pose;
   doubtful.health = OdometryHealth::degenerate;

@@ -91,10 +91,14 @@ bool all_points(std::uint32_t) { return true; }
 FeatureSets usable_features(const ScanInParts& parts, const OdometryConfig& config) {
   const UsablePoints usable(parts, config);
   const FeaturePoints points(parts, config);
+  std::vector<FeaturePoint> upright = points.of(parts.features.upright_points, all_points);
+  if (!parts.features.point_tangents.empty())
+    for (std::size_t k = 0; k < upright.size(); ++k)
+      upright[k].tangent_lidar = parts.features.point_tangents[parts.features.upright_points[k]];
   return {.edges = points.of(parts.features.edges, usable),
           .planes = points.of(parts.features.registered_planes, usable),
           .surfaces = points.of(parts.features.surfaces, usable),
-          .points = points.of(parts.features.upright_points, all_points),
+          .points = std::move(upright),
           .level_points = points.of(parts.features.level_points, all_points),
           .rolling = points.rolling(),
           .sweep_prior = parts.sweep_prior,
