@@ -34,7 +34,7 @@ Interface::Interface(const ServerConfig& config, const InterfaceContext& context
     : participant_(context.participant),
       map_publisher_(context.participant, context.topics, config, context.storage.latest_map(),
                      context.storage.tiles()),
-      discovery_diagnostics_(context.participant),
+      discovery_diagnostics_(context.participant, config.topics.name_space),
       report_(
           traits(config, context), context.storage.latest_map(), context.statistics,
           [this] { return diagnostics(); }, [this] { return no_input_reason(); }) {

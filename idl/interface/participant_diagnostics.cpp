@@ -1,9 +1,12 @@
 #include "idl/interface/participant_diagnostics.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <string_view>
 
 #include "idl/dds/ros_graph.hpp"
+#include "idl/dds/service_topics.hpp"
+#include "idl/interface/services.hpp"
 
 namespace stillmap::dds {
 namespace {
@@ -173,6 +176,32 @@ std::vector<Diagnostic> silent_participant_diagnostics(
            .evidence = describe(peer) + " is seen by multicast, but none of its topics",
            .hint = "let UDP ports 7400 to 65535 pass the firewalls between both machines"});
     }
+  }
+  return diagnostics;
+}
+
+std::vector<RemoteParticipant> servers_called(const std::string& name_space,
+                                              const std::vector<RemoteParticipant>& peers) {
+  const std::string answers = reply_topic(services::get_status.in(name_space));
+  std::vector<RemoteParticipant> servers;
+  std::ranges::copy_if(peers, std::back_inserter(servers), [&](const RemoteParticipant& peer) {
+    return std::ranges::any_of(peer.endpoints, [&](const Endpoint& endpoint) {
+      return endpoint.is_writer && endpoint.topic == answers;
+    });
+  });
+  return servers;
+}
+
+std::vector<Diagnostic> namesake_diagnostics(const std::string& name_space,
+                                             const std::vector<RemoteParticipant>& namesakes) {
+  std::vector<Diagnostic> diagnostics;
+  for (const RemoteParticipant& server : namesakes) {
+    diagnostics.push_back(
+        {.severity = Severity::problem,
+         .what =
+             "another server is called '" + name_space + "' (" + describe_location(server) + ")",
+         .evidence = "both map the same scans, and either may answer, save or reset",
+         .hint = "stop one, or give it another topics.namespace or domain"});
   }
   return diagnostics;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "idl/dds/endpoint_match.hpp"
@@ -25,6 +26,14 @@ inline constexpr const char* survey_participant = "stillmap_survey";
 /// separate shared memory. Discovery must have had a few seconds.
 [[nodiscard]] std::vector<Diagnostic> silent_participant_diagnostics(
     const RemoteParticipant& self, const std::vector<RemoteParticipant>& peers);
+
+/// The peers that answer as the server whose topics lie in `name_space`.
+[[nodiscard]] std::vector<RemoteParticipant> servers_called(
+    const std::string& name_space, const std::vector<RemoteParticipant>& peers);
+
+/// One for each of `namesakes`: other servers that are called `name_space`, as ours is.
+[[nodiscard]] std::vector<Diagnostic> namesake_diagnostics(
+    const std::string& name_space, const std::vector<RemoteParticipant>& namesakes);
 
 /// How many scans of a publisher arrived lately, and how many did not.
 struct ScanLosses {

@@ -56,12 +56,13 @@ std::string reduced_pace(const dds::SegmentationStatus& segmentation) {
 
 }  // namespace
 
-DiscoveryDiagnostics::DiscoveryDiagnostics(const dds::Participant& participant)
-    : participant_(participant) {}
+DiscoveryDiagnostics::DiscoveryDiagnostics(const dds::Participant& participant,
+                                           std::string name_space)
+    : participant_(participant), name_space_(std::move(name_space)) {}
 
 std::vector<dds::Diagnostic> DiscoveryDiagnostics::diagnostics() {
   const std::scoped_lock lock(mutex_);
-  const auto now = std::chrono::steady_clock::now();
+  const auto now = Clock::now();
   if (now - collected_ < std::chrono::seconds(1)) return last_;
   collected_ = now;
   last_ = collect();
@@ -71,10 +72,30 @@ std::vector<dds::Diagnostic> DiscoveryDiagnostics::diagnostics() {
   return last_;
 }
 
-std::vector<dds::Diagnostic> DiscoveryDiagnostics::collect() const {
+std::vector<dds::RemoteParticipant> DiscoveryDiagnostics::namesakes(
+    const std::vector<dds::RemoteParticipant>& peers) {
+  std::vector<dds::RemoteParticipant> found = dds::servers_called(name_space_, peers);
+  std::erase_if(namesakes_since_, [&](const auto& known) {
+    return std::ranges::find(found, known.first, &dds::RemoteParticipant::guid) == found.end();
+  });
+  // A discovery server tells those who come of one that was killed, until its lease has run out.
+  const dds::DdsOptions& options = participant_.options();
+  const std::chrono::seconds patience(options.discovery_server.host.empty() ? 0
+                                                                            : options.lease_s + 2);
+  const auto now = Clock::now();
+  std::erase_if(found, [&](const dds::RemoteParticipant& server) {
+    return now - namesakes_since_.try_emplace(server.guid, now).first->second < patience;
+  });
+  return found;
+}
+
+std::vector<dds::Diagnostic> DiscoveryDiagnostics::collect() {
   const dds::RemoteParticipant self = participant_.self();
   const std::vector<dds::RemoteParticipant> peers = participant_.remote_participants();
-  std::vector<dds::Diagnostic> all = dds::mismatch_diagnostics(own_mismatches(self, peers));
+  std::vector<dds::Diagnostic> all = dds::namesake_diagnostics(name_space_, namesakes(peers));
+  for (dds::Diagnostic& diagnostic : dds::mismatch_diagnostics(own_mismatches(self, peers))) {
+    all.push_back(std::move(diagnostic));
+  }
   for (dds::Diagnostic& diagnostic : dds::security_diagnostics(self, peers)) {
     all.push_back(std::move(diagnostic));
   }

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -20,21 +21,31 @@
 namespace stillmap::server {
 
 /// Problems between the server and the other participants of its domain: endpoints whose types or
-/// quality of service do not match, and identities that are refused. Thread-safe.
+/// quality of service do not match, identities that are refused, and other servers of its name.
+/// Thread-safe.
 class DiscoveryDiagnostics {
  public:
   /// Each diagnostic is also logged when it occurs and was not among the last thousand.
-  explicit DiscoveryDiagnostics(const dds::Participant& participant);
+  /// `name_space`: of the server's topics, by which clients call it.
+  DiscoveryDiagnostics(const dds::Participant& participant, std::string name_space);
 
   /// At most a second old: comparing all endpoints takes time in a domain of many participants.
   [[nodiscard]] std::vector<dds::Diagnostic> diagnostics();
 
  private:
-  [[nodiscard]] std::vector<dds::Diagnostic> collect() const;
+  using Clock = std::chrono::steady_clock;
+
+  [[nodiscard]] std::vector<dds::Diagnostic> collect();
+  /// Other servers of this name, without those that may have been killed already.
+  [[nodiscard]] std::vector<dds::RemoteParticipant> namesakes(
+      const std::vector<dds::RemoteParticipant>& peers);
 
   const dds::Participant& participant_;
+  const std::string name_space_;
   std::mutex mutex_;
-  std::chrono::steady_clock::time_point collected_;
+  Clock::time_point collected_;
+  /// By guid, since when each of them is known.
+  std::map<std::string, Clock::time_point> namesakes_since_;
   std::vector<dds::Diagnostic> last_;
   NewLines logged_;
 };

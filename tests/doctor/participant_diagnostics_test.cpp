@@ -67,6 +67,22 @@ TEST(ParticipantDiagnosticsTest, BlameSharedMemoryForASilentPeerOnThisHost) {
   EXPECT_THAT(dds::silent_participant_diagnostics(participant("self"), {silent}), IsEmpty());
 }
 
+TEST(ParticipantDiagnosticsTest, NameOtherServersOfAName) {
+  const std::string reply = "stillmap_msgs::srv::dds_::GetStatus_Response_";
+  const std::string request = "stillmap_msgs::srv::dds_::GetStatus_Request_";
+  dds::RemoteParticipant other = participant("other");
+  other.process = "12";
+  other.endpoints = {test::make_endpoint("rr/stillmap/get_statusReply", reply, true)};
+  dds::RemoteParticipant of_another_name = participant("of_another_name");
+  of_another_name.endpoints = {test::make_endpoint("rr/upstairs/get_statusReply", reply, true)};
+  dds::RemoteParticipant client = participant("client");
+  client.endpoints = {test::make_endpoint("rr/stillmap/get_statusReply", reply, false),
+                      test::make_endpoint("rq/stillmap/get_statusRequest", request, true)};
+  const auto found = dds::servers_called("stillmap", {client, of_another_name, other});
+  EXPECT_THAT(dds::namesake_diagnostics("stillmap", found),
+              ElementsAre(tells("another server is called 'stillmap' (this host, process 12)")));
+}
+
 TEST(ParticipantDiagnosticsTest, SayEachMismatchOnceWithItsRemedy) {
   const dds::Mismatch mismatch{.topic = "rt/points",
                                .writer = {},

@@ -1,0 +1,66 @@
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <string>
+
+#include "tests/server/server_process.hpp"
+
+namespace stillmap::test {
+namespace {
+
+/// Whether the server that answers, whichever it is, says so of another one.
+bool names_another(const dds::ServerStatus& status) {
+  return std::ranges::any_of(status.diagnostics, [](const dds::Diagnostic& diagnostic) {
+    return diagnostic.what.starts_with("another server is called 'stillmap'") &&
+           diagnostic.hint.find("topics.namespace") != std::string::npos;
+  });
+}
+
+TEST(Namesake, IsToldAsLongAsItIsThere) {
+  const ServiceSetup setup("every");
+  const ServiceSetup another("every");
+  const ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  EXPECT_FALSE(names_another(client.status()));
+  {
+    ServerProcess second(another.server_arguments());
+    EXPECT_TRUE(eventually([&] { return names_another(client.status()); }));
+    second.send(SIGTERM);
+    EXPECT_EQ(second.wait_for_exit(patience), 0);
+  }
+  EXPECT_TRUE(eventually([&] { return !names_another(client.status()); }));
+}
+
+TEST(Namesake, IsNoServerOfAnotherName) {
+  const ServiceSetup setup("every");
+  const ServiceSetup another("every");
+  another.add("topics: {namespace: upstairs}\n");
+  const ServerProcess server(setup.server_arguments());
+  const ServerProcess second(another.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  ClientOptions upstairs = setup.client();
+  upstairs.server_name = "upstairs";
+  Client second_client(upstairs);
+  second_client.wait_for_server(patience);
+  // Longer than the status keeps what discovery told.
+  EXPECT_FALSE(eventually([&] { return names_another(client.status()); }, std::chrono::seconds(3)));
+}
+
+TEST(Namesake, IsNotThePredecessorThatWasKilled) {
+  const ServiceSetup setup("every");
+  {
+    const ServerProcess killed(setup.server_arguments());
+    Client client(setup.client());
+    client.wait_for_server(patience);
+  }
+  const ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  EXPECT_FALSE(eventually([&] { return names_another(client.status()); }, std::chrono::seconds(3)));
+}
+
+}  // namespace
+}  // namespace stillmap::test
