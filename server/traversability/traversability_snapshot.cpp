@@ -56,13 +56,14 @@ std::vector<std::shared_ptr<const Tile>> tiles_round(
 
 void TraversabilitySnapshot::publish(Views views, std::shared_ptr<const MapSnapshot> map,
                                      const TileRange& window, std::uint64_t corrections,
-                                     std::int64_t stamp_ns) {
+                                     std::int64_t stamp_ns, std::optional<MapTime> map_time) {
   const std::scoped_lock lock(mutex_);
   views_ = std::move(views);
   map_ = std::move(map);
   window_ = window;
   corrections_ = corrections;
   stamp_ns_ = stamp_ns;
+  map_time_ = map_time;
 }
 
 bool TraversabilitySnapshot::Known::has(const Tile& tile) const {
@@ -79,17 +80,25 @@ TraversabilitySnapshot::Known TraversabilitySnapshot::known(const std::string& p
   const auto found = std::ranges::find_if(
       views_, [&](const auto& candidate) { return candidate->profile.name == profile; });
   if (found == views_.end()) throw std::invalid_argument(unknown_profile(profile, views_));
-  return {*found, map_, window_, corrections_, stamp_ns_};
+  return {*found, map_, window_, corrections_, stamp_ns_, map_time_};
 }
 
 TraversabilityCache::TraversabilityCache(const TraversabilitySnapshot& snapshot,
-                                         const LatestMap& latest_map, TileReader& tiles)
-    : snapshot_(snapshot), latest_map_(latest_map), tiles_(tiles) {}
+                                         const LatestMap& latest_map, TileReader& tiles,
+                                         std::chrono::milliseconds longest_lag)
+    : snapshot_(snapshot), latest_map_(latest_map), tiles_(tiles), longest_lag_(longest_lag) {}
+
+bool TraversabilityCache::is_behind(const TraversabilitySnapshot::Known& kept, MapTime map_time,
+                                    std::span<const std::shared_ptr<const Tile>> tiles,
+                                    std::span<const Eigen::AlignedBox2d> boxes_map) const {
+  if (!kept.map_time || map_time - *kept.map_time <= longest_lag_) return false;
+  return !std::ranges::equal(tiles_round(*kept.map, boxes_map), tiles);
+}
 
 std::shared_ptr<const TraversabilityView> TraversabilityCache::view(
     const std::string& profile, std::span<const Eigen::AlignedBox2d> boxes_map) const {
   const TraversabilitySnapshot::Known kept = snapshot_.known(profile);
-  const auto map = latest_map_.view();
+  const auto [map, map_time] = *latest_map_.wait_for_update(nullptr, {}, {});
   auto tiles = tiles_round(*map, boxes_map);
   // After a load or a reset what is kept is of the last map for a while.
   const bool is_of_map = kept.map == nullptr || kept.map->map_id == map->map_id;
@@ -97,10 +106,12 @@ std::shared_ptr<const TraversabilityView> TraversabilityCache::view(
   const bool is_where_it_was = kept.map == nullptr ||
                                kept.corrections == latest_map_.corrections() ||
                                tiles_round(*kept.map, boxes_map) == tiles;
-  if (is_of_map && is_where_it_was &&
-      std::ranges::all_of(tiles, [&](const auto& tile) { return kept.has(*tile); }))
-    return kept.view;
-  if (tiles.size() > max_tiles) {
+  const bool has_all =
+      is_of_map && is_where_it_was &&
+      std::ranges::all_of(tiles, [&](const auto& tile) { return kept.has(*tile); });
+  const bool is_small = tiles.size() <= max_tiles;
+  if (has_all && !(is_small && is_behind(kept, map_time, tiles, boxes_map))) return kept.view;
+  if (!is_small) {
     throw std::invalid_argument("the region has " + std::to_string(tiles.size()) +
                                 " tiles or more, of which some are on disk, far from the robot or "
                                 "just corrected; at most " +

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <chrono>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,6 +16,9 @@
 
 namespace stillmap::server {
 
+/// When a view of the map was published.
+using MapTime = std::chrono::steady_clock::time_point;
+
 /// The traversability of all robots as of the last update, as immutable views: readers never wait
 /// for an update. Thread-safe.
 class TraversabilitySnapshot {
@@ -23,9 +28,10 @@ class TraversabilitySnapshot {
 
   /// `map`: that they were computed from, where its tiles are in memory and in the window; null
   /// before the first. `corrections` and `stamp_ns`, that of its newest pose: LatestMap's, read
-  /// before the map.
+  /// before the map. `map_time`: the map's; nothing where it is not known.
   void publish(Views views, std::shared_ptr<const MapSnapshot> map, const TileRange& window,
-               std::uint64_t corrections = 0, std::int64_t stamp_ns = 0);
+               std::uint64_t corrections = 0, std::int64_t stamp_ns = 0,
+               std::optional<MapTime> map_time = {});
 
   /// A view, and what of the map it knows.
   struct Known {
@@ -34,6 +40,7 @@ class TraversabilitySnapshot {
     TileRange window;
     std::uint64_t corrections = 0;
     std::int64_t stamp_ns = 0;
+    std::optional<MapTime> map_time;
 
     /// Whether the view has the tile's surface: one that was read from the disk since is not in it,
     /// one that is new will be.
@@ -52,19 +59,24 @@ class TraversabilitySnapshot {
   TileRange window_;
   std::uint64_t corrections_ = 0;
   std::int64_t stamp_ns_ = 0;
+  std::optional<MapTime> map_time_;
 };
 
 /// The traversability of any part of the map: the view that is kept up to date in the background,
-/// or, where it does not reach or tiles of the map are not in memory, one that is computed for the
-/// query. Thread-safe.
+/// or, where it does not reach, tiles of the map are not in memory, or it has fallen behind on a
+/// busy machine, one that is computed for the query. Thread-safe.
 class TraversabilityCache {
  public:
+  /// `longest_lag`: how much older than the map the view in the background may be where the map
+  /// has changed since.
   TraversabilityCache(const TraversabilitySnapshot& snapshot, const LatestMap& latest_map,
-                      TileReader& tiles);
+                      TileReader& tiles,
+                      std::chrono::milliseconds longest_lag = std::chrono::seconds(2));
 
-  /// A view that is complete within the boxes (map frame [m]). Throws std::invalid_argument for an
-  /// unknown robot, naming the known ones, and for boxes with more tiles than are computed for
-  /// one answer; and as TileReader::read.
+  /// A view that is complete within the boxes (map frame [m]); of more tiles than are computed for
+  /// one answer it may be older than `longest_lag`. Throws std::invalid_argument for an
+  /// unknown robot, naming the known ones, and for boxes with more such tiles that the view in the
+  /// background has not; and as TileReader::read.
   [[nodiscard]] std::shared_ptr<const TraversabilityView> view(
       const std::string& profile, std::span<const Eigen::AlignedBox2d> boxes_map) const;
   [[nodiscard]] std::shared_ptr<const TraversabilityView> view(
@@ -73,9 +85,16 @@ class TraversabilityCache {
   }
 
  private:
+  /// Whether the view in the background lacks what the map, published at `map_time`, has in the
+  /// boxes for long.
+  [[nodiscard]] bool is_behind(const TraversabilitySnapshot::Known& kept, MapTime map_time,
+                               std::span<const std::shared_ptr<const Tile>> tiles,
+                               std::span<const Eigen::AlignedBox2d> boxes_map) const;
+
   const TraversabilitySnapshot& snapshot_;
   const LatestMap& latest_map_;
   TileReader& tiles_;
+  std::chrono::milliseconds longest_lag_;
 };
 
 }  // namespace stillmap::server

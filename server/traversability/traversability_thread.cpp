@@ -88,7 +88,8 @@ void TraversabilityThread::follow_map(const std::stop_token& stop) {
   next_update_ = clock_.now() + std::chrono::duration_cast<Clock::duration>(period_);
   corrections_ = map_.latest.corrections();
   stamp_ns_ = map_.latest.newest_pose().stamp_ns;
-  const auto view = map_.latest.view();
+  const auto [view, map_time] = *map_.latest.wait_for_update(nullptr, {}, {});
+  map_time_ = map_time;
   if (!known_ || known_->map_id != view->map_id) kept_.clear();
   known_ = view;
   robot_map_ = map_.latest.newest_pose().T_map_lidar.translation();
@@ -186,7 +187,7 @@ void TraversabilityThread::publish() {
   for (const RobotProfile& robot : traversability_.profiles()) {
     views.push_back(traversability_.view(robot.name));
   }
-  snapshot_.publish(std::move(views), known_, window_, corrections_, stamp_ns_);
+  snapshot_.publish(std::move(views), known_, window_, corrections_, stamp_ns_, map_time_);
 }
 
 }  // namespace stillmap::server

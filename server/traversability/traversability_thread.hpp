@@ -67,6 +67,7 @@ class TraversabilityThread {
   std::shared_ptr<const MapSnapshot> known_;
   std::uint64_t corrections_ = 0;
   std::int64_t stamp_ns_ = 0;
+  std::optional<MapTime> map_time_;
   Eigen::Vector3d robot_map_ = Eigen::Vector3d::Zero();
   TileRange window_;
   std::set<TileId> kept_;

@@ -213,7 +213,7 @@ TEST_F(TraversabilityThreadTest, AnswersAreNeverOfTheMapBeforeItsCorrection) {
   ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
   thread_.reset();
   TileReader tiles;
-  const TraversabilityCache cache(snapshot_, latest_map_, tiles);
+  const TraversabilityCache cache(snapshot_, latest_map_, tiles, 1h);
   const Eigen::AlignedBox2d box(Eigen::Vector2d(-1.0, -1.0), Eigen::Vector2d(3.0, 3.0));
   const auto before = cache.view("small", box);
   EXPECT_EQ(test::look(*before, 1.1, 1.1).cell.cost, 0);
@@ -228,6 +228,25 @@ TEST_F(TraversabilityThreadTest, AnswersAreNeverOfTheMapBeforeItsCorrection) {
   start(0s);
   ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
   EXPECT_EQ(cache.view("small", box), snapshot_.view("small"));
+}
+
+TEST_F(TraversabilityThreadTest, AnswersDoNotWaitForAViewThatIsFarBehind) {
+  start(0s);
+  ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
+  // As where other programs take all cores from a thread of idle priority.
+  thread_.reset();
+  TileReader tiles;
+  const TraversabilityCache patient(snapshot_, latest_map_, tiles, 1h);
+  const TraversabilityCache impatient(snapshot_, latest_map_, tiles, 0ms);
+  const Eigen::AlignedBox2d box(Eigen::Vector2d(-1.0, -1.0), Eigen::Vector2d(3.0, 3.0));
+  const auto kept = snapshot_.view("small");
+  EXPECT_EQ(impatient.view("small", box), kept) << "nothing has changed";
+  world_.block(1, 1, 2, 2, 0.3, 2.0, building);
+  latest_map_.publish(shared(world_.view()));
+  EXPECT_EQ(patient.view("small", box), kept);
+  const auto now = impatient.view("small", box);
+  EXPECT_EQ(now->version, latest_map_.view()->version);
+  EXPECT_EQ(test::look(*now, 1.1, 1.1).cell.cost, 100);
 }
 
 TEST_F(TraversabilityThreadTest, APathIsAnsweredByTheTilesAlongIt) {
