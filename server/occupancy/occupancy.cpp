@@ -69,7 +69,10 @@ void OctomapPublisher::publish_when_encoded() {
 
 Occupancy::Occupancy(dds::Participant& participant, const dds::Topics& topics,
                      const ServerConfig& config, Statistics& statistics, ThrottleCallback throttle)
-    : thread_(config.occupancy, statistics, std::move(throttle)),
+    : thread_(config.occupancy, statistics, std::move(throttle),
+              config.input.delivery == DeliveryMode::every ? BackgroundScheduling::normal
+                                                           : BackgroundScheduling::idle,
+              config.input.delivery),
       publisher_(participant, topics, config, thread_) {}
 
 }  // namespace stillmap::server

@@ -12,12 +12,22 @@ namespace {
 /// Besides scans: a new map, a view to follow, an encoding.
 constexpr std::size_t urgent_kinds = 3;
 
+/// Of jobs in the queue's order.
+template <typename Jobs>
+std::size_t scans_in(Jobs& jobs) {
+  const auto oldest = std::ranges::find_if(
+      jobs, [](const auto& job) { return std::holds_alternative<OccupancyScan>(job); });
+  return static_cast<std::size_t>(jobs.end() - oldest);
+}
+
 }  // namespace
 
 OccupancyThread::OccupancyThread(const OccupancyServiceConfig& config, Statistics& statistics,
-                                 ThrottleCallback throttle, BackgroundScheduling scheduling)
+                                 ThrottleCallback throttle, BackgroundScheduling scheduling,
+                                 DeliveryMode delivery)
     : config_(config.map),
       max_scans_(config.queue_length),
+      every_scan_counts_(delivery == DeliveryMode::every),
       statistics_(statistics),
       throttle_(std::move(throttle)),
       jobs_(config.queue_length + urgent_kinds),
@@ -52,11 +62,13 @@ void OccupancyThread::begin(std::shared_ptr<const MapSnapshot> view) {
 }
 
 void OccupancyThread::add(OccupancyScan scan) {
+  if (every_scan_counts_) {
+    jobs_.wait_until([this](const Jobs& jobs) { return scans_in(jobs) < max_scans_; },
+                     longest_back_pressure);
+  }
   jobs_.edit([&](Jobs& jobs) {
-    const auto oldest = std::ranges::find_if(
-        jobs, [](const Job& job) { return std::holds_alternative<OccupancyScan>(job); });
-    if (static_cast<std::size_t>(jobs.end() - oldest) >= max_scans_) {
-      jobs.erase(oldest);
+    if (const std::size_t scans = scans_in(jobs); scans >= max_scans_) {
+      jobs.erase(jobs.end() - static_cast<std::ptrdiff_t>(scans));
       statistics_.count("occupancy_scans_dropped");
     }
     jobs.emplace_back(std::move(scan));
@@ -107,7 +119,7 @@ void OccupancyThread::run(Encoding job) {
 void OccupancyThread::run(OccupancyScan scan) {
   using Clock = std::chrono::steady_clock;
   const auto began = Clock::now();
-  const bool clears = jobs_.waiting() <= max_scans_ / 2;
+  const bool clears = every_scan_counts_ || jobs_.waiting() <= max_scans_ / 2;
   if (!clears) statistics_.count("occupancy_not_cleared");
   // Only this thread changes the map; a query waits for one portion at most.
   map_.compute_update(*scan.labelled, scan.T_map_lidar,

@@ -42,20 +42,26 @@ class OctreeNotMade : public std::runtime_error {
 
 /// Keeps the octree on a thread, of idle priority so that the mapper never waits for it. When it
 /// cannot keep up, it first stops clearing free space along the rays ("occupancy_not_cleared" in
-/// the status), then drops scans ("occupancy_scans_dropped"). Thread-safe.
+/// the status), then drops scans ("occupancy_scans_dropped"). Where every scan counts, it runs at
+/// normal priority, and the mapper waits for it instead. Thread-safe.
 class OccupancyThread {
  public:
   OccupancyThread(const OccupancyServiceConfig& config, Statistics& statistics,
                   ThrottleCallback throttle = {},
-                  BackgroundScheduling scheduling = BackgroundScheduling::idle);
+                  BackgroundScheduling scheduling = BackgroundScheduling::idle,
+                  DeliveryMode delivery = DeliveryMode::latest);
 
   /// How long after the beginning of a map queries still wait for its octree: less than clients
   /// wait for an answer before they ask again. They are answered one after the other: were it as
   /// long for each, those behind the first would hear nothing in time.
   static constexpr std::chrono::milliseconds longest_wait{2000};
 
+  /// With delivery `every`, how long `add` waits for room at most: an octree that makes none by
+  /// then must not end a replay.
+  static constexpr std::chrono::milliseconds longest_back_pressure{20'000};
+
   /// Starts a new map from the voxels of this view; until they are inserted, queries wait. Returns
-  /// at once, as `add` does.
+  /// at once, as `add` does but with delivery `every`; one thread calls both.
   void begin(std::shared_ptr<const MapSnapshot> view);
   void add(OccupancyScan scan);
   /// Drops and restores parts of the octree with the tiles that were evicted and reloaded.
@@ -103,6 +109,7 @@ class OccupancyThread {
 
   OccupancyConfig config_;
   std::size_t max_scans_;
+  bool every_scan_counts_;
   Statistics& statistics_;
   ThrottleCallback throttle_;
   BoundedQueue<Job> jobs_;

@@ -47,6 +47,13 @@ class BoundedQueue {
     changed_.notify_all();
   }
 
+  /// Waits until `condition(const std::deque<T>&)` holds. False after `timeout`.
+  template <typename Condition>
+  bool wait_until(Condition condition, std::chrono::milliseconds timeout) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, timeout, [&] { return condition(std::as_const(items_)); });
+  }
+
   /// Waits for an item. False after `timeout` or when a stop was requested.
   [[nodiscard]] bool wait_for_item(const std::stop_token& stop, std::chrono::milliseconds timeout) {
     std::unique_lock lock(mutex_);

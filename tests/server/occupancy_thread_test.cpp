@@ -248,6 +248,23 @@ TEST_F(GatedOccupancyThreadTest, NoOctreeOfAnOldMapIsPublishedWhileAnotherIsEnco
   EXPECT_EQ(octree.data().size(), OccupancyMap(OccupancyConfig{}).encode(true).bytes.size());
 }
 
+TEST_F(OccupancyThreadTest, TakesEveryScanWholeWhereEachCounts) {
+  OccupancyServiceConfig config;
+  config.queue_length = 2;
+  server::OccupancyThread thread(config, statistics_, {}, scheduling, DeliveryMode::every);
+  OccupancyMap map(OccupancyConfig{});
+  constexpr int scans = 40;
+  for (int i = 0; i < scans; ++i) {
+    const server::OccupancyScan scan = room(i % 8);
+    map.insert(*scan.labelled, scan.T_map_lidar);
+    thread.add(scan);
+  }
+  ASSERT_TRUE(done(thread, scans));
+  EXPECT_EQ(counted(statistics_, "occupancy_scans_dropped"), 0U);
+  EXPECT_EQ(counted(statistics_, "occupancy_not_cleared"), 0U);
+  EXPECT_EQ(thread.encode(false).data.bytes, map.encode(false).bytes);
+}
+
 TEST_F(OccupancyThreadTest, StopsClearingAndThenDropsScansWhenItCannotKeepUp) {
   OccupancyServiceConfig config;
   config.queue_length = 4;

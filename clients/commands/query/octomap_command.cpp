@@ -250,6 +250,16 @@ class OccupancySource {
   [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query) {
     return map_ ? map_->answer(query) : client_->query_occupancy(query);
   }
+  /// What of the scans that a server has mapped is not in its octree; empty where all is.
+  [[nodiscard]] std::string missing() {
+    if (map_) return {};
+    const dds::ServerStatus status = client_->status();
+    const std::uint64_t dropped = status.counter("occupancy_scans_dropped");
+    if (dropped == 0) return {};
+    return std::to_string(dropped) + " of the " + std::to_string(status.counter("scans_mapped")) +
+           " scans that the server has mapped since it started are not in its octree, which could "
+           "not keep up; an octree of the whole static map: 'stillmap octomap --map MAPFILE'";
+  }
 
  private:
   std::optional<OccupancyMap> map_;
@@ -282,6 +292,8 @@ ExitCode run(const OctomapArguments& arguments) {
     }
   }
   std::cout << (arguments.json ? report.dump(2) + "\n" : text);
+  if (const std::string missing = source.missing(); !missing.empty())
+    std::cerr << "stillmap: " << missing << "\n";
   return refused(answers) == 0 ? ExitCode::ok : ExitCode::bad_input;
 }
 
