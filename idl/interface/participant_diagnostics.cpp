@@ -58,6 +58,8 @@ std::pair<const RemoteParticipant*, const Endpoint*> owner_of(
   return {nullptr, nullptr};
 }
 
+constexpr std::string_view namesake_words = "another server is called ";
+
 constexpr const char* carriage_hint =
     "give the publisher's shared memory more room than a scan takes (Fast DDS: segment_size, 512 "
     "KB "
@@ -198,12 +200,16 @@ std::vector<Diagnostic> namesake_diagnostics(const std::string& name_space,
   for (const RemoteParticipant& server : namesakes) {
     diagnostics.push_back(
         {.severity = Severity::problem,
-         .what =
-             "another server is called '" + name_space + "' (" + describe_location(server) + ")",
+         .what = std::string(namesake_words) + "'" + name_space + "' (" +
+                 describe_location(server) + ")",
          .evidence = "both map the same scans, and either may answer, save or reset",
          .hint = "stop one, or give it another topics.namespace or domain"});
   }
   return diagnostics;
+}
+
+bool is_of_namesake(const Diagnostic& diagnostic) {
+  return diagnostic.what.starts_with(namesake_words);
 }
 
 }  // namespace stillmap::dds

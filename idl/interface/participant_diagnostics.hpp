@@ -35,6 +35,9 @@ inline constexpr const char* survey_participant = "stillmap_survey";
 [[nodiscard]] std::vector<Diagnostic> namesake_diagnostics(
     const std::string& name_space, const std::vector<RemoteParticipant>& namesakes);
 
+/// Whether the diagnostic is one of those.
+[[nodiscard]] bool is_of_namesake(const Diagnostic& diagnostic);
+
 /// How many scans of a publisher arrived lately, and how many did not.
 struct ScanLosses {
   /// Of the publisher, as in Endpoint.

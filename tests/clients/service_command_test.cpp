@@ -109,6 +109,29 @@ TEST_F(ServiceCommandTest, LosslessReplayRefusesAServerThatDropsScans) {
   EXPECT_THAT(replay.err, HasSubstr("--delivery every"));
 }
 
+TEST_F(ServiceCommandTest, ReplayOfScansThatTheServerHasGivesNoPosesOfThen) {
+  simulate("city", 6);
+  BackgroundProcess server(server_command("--delivery every"), folder_ / "server.log");
+  ASSERT_EQ(run("replay " + path("city") + " --lossless" + patiently() + on_domain()).exit_code, 0)
+      << content("server.log");
+  const ProcessResult again =
+      run("replay " + path("city") + " --scans 3 --rate 20 --json" + patiently() + on_domain());
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_THAT(again.err, AllOf(HasSubstr("mapped none of the 3"), HasSubstr("stillmap reset")));
+  EXPECT_EQ(nlohmann::json::parse(again.out).at("poses"), 0);
+}
+
+TEST_F(ServiceCommandTest, ARobotWithoutAPoseIsNoMissingServer) {
+  BackgroundProcess server(server_command(), folder_ / "server.log");
+  ASSERT_EQ(run("status" + patiently() + on_domain()).exit_code, 0) << content("server.log");
+  for (const char* command :
+       {"query --around-robot 30", "traversable --around-robot 30", "plan --to 5,0"}) {
+    const ProcessResult result = run(command + patiently() + on_domain());
+    EXPECT_EQ(result.exit_code, 1) << command;
+    EXPECT_THAT(result.err, HasSubstr("no pose yet")) << command;
+  }
+}
+
 TEST_F(ServiceCommandTest, AsksARunningServerForEverythingOfItsMap) {
   simulate("city", 5);
   BackgroundProcess server(server_command("--delivery every"), folder_ / "server.log");

@@ -1,14 +1,10 @@
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <iostream>
-#include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -21,6 +17,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/dataset/recording.hpp"
 #include "clients/commands/live/replay_clock.hpp"
+#include "clients/commands/live/replay_poses.hpp"
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
 #include "clients/commands/mapping/sample_feed.hpp"
@@ -33,40 +30,10 @@
 #include "config/loaders/topic_name.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/scan_dataset.hpp"
+#include "idl/interface/participant_diagnostics.hpp"
 
 namespace stillmap::cli {
 namespace {
-
-/// The poses that a server publishes, by stamp: from the odometry topic, and those that were lost
-/// there from the path. Callbacks may run on any thread.
-class PoseLog {
- public:
-  /// Starts listening. The client must outlive the log.
-  explicit PoseLog(Client& client);
-
-  /// Waits until every one of these scans has its pose, or `timeout` has passed.
-  void wait_for(const std::vector<std::int64_t>& stamps_ns, std::chrono::milliseconds timeout);
-
-  /// The poses of these scans, in their order, without those that have none.
-  [[nodiscard]] Trajectory poses_of(const std::vector<std::int64_t>& stamps_ns) const;
-
-  /// What they are poses of.
-  [[nodiscard]] std::string frame() const;
-
- private:
-  /// From the odometry topic: replaces the pose of a scan that is sent again.
-  void take(const OdometryUpdate& update);
-  /// From the path, which may be older: does not replace a pose.
-  void add(const StampedPose& pose);
-
-  mutable std::mutex mutex_;
-  std::condition_variable added_;
-  std::map<std::int64_t, Eigen::Isometry3d> T_map_lidar_;
-  std::string frame_ = "lidar";
-  // Last members: their callbacks end before the poses are destroyed.
-  Subscription odometry_;
-  Subscription path_;
-};
 
 struct ReplayOptions {
   ScanRange range;
@@ -93,55 +60,12 @@ struct ServerCounts {
   bool is_restarted = false;
 };
 
-PoseLog::PoseLog(Client& client)
-    : odometry_(client.subscribe_odometry([this](const OdometryUpdate& update) {
-        take(update);
-        added_.notify_one();
-      })),
-      path_(client.subscribe_path([this](const Trajectory& path) {
-        for (const StampedPose& pose : path) add(pose);
-        added_.notify_one();
-      })) {}
-
-void PoseLog::take(const OdometryUpdate& update) {
-  const std::lock_guard lock(mutex_);
-  T_map_lidar_.insert_or_assign(update.pose.stamp_ns, update.pose.T_map_lidar);
-  frame_ = update.child_frame;
-}
-
-std::string PoseLog::frame() const {
-  const std::lock_guard lock(mutex_);
-  return frame_;
-}
-
-void PoseLog::add(const StampedPose& pose) {
-  const std::lock_guard lock(mutex_);
-  T_map_lidar_.try_emplace(pose.stamp_ns, pose.T_map_lidar);
-}
-
-void PoseLog::wait_for(const std::vector<std::int64_t>& stamps_ns,
-                       std::chrono::milliseconds timeout) {
-  std::unique_lock lock(mutex_);
-  added_.wait_for(lock, timeout, [&] {
-    return std::all_of(stamps_ns.begin(), stamps_ns.end(),
-                       [&](std::int64_t stamp_ns) { return T_map_lidar_.contains(stamp_ns); });
-  });
-}
-
-Trajectory PoseLog::poses_of(const std::vector<std::int64_t>& stamps_ns) const {
-  const std::lock_guard lock(mutex_);
-  Trajectory trajectory;
-  for (const std::int64_t stamp_ns : stamps_ns) {
-    const auto found = T_map_lidar_.find(stamp_ns);
-    if (found != T_map_lidar_.end()) trajectory.push_back({stamp_ns, found->second});
-  }
-  return trajectory;
-}
-
 using Clock = ReplayClock::Clock;
 constexpr std::chrono::milliseconds publish_step{500};
 constexpr std::chrono::milliseconds imu_patience{1000};
 constexpr std::chrono::milliseconds status_period{100};
+/// A server sends its path, if there is one, to those who come late.
+constexpr std::chrono::milliseconds path_patience{2000};
 
 /// Returns true when a signal arrived first.
 [[nodiscard]] bool wait_or_stop(Clock::time_point due, StopSignal& stop) {
@@ -293,6 +217,8 @@ struct ReplayOutcome {
   ReplayResult replay;
   /// Nothing where a signal ended the replay: then nobody waits for a server that may hang.
   std::optional<ServerCounts> server;
+  /// Scans may be for others alone, on a topic of theirs.
+  bool server_takes_topic = false;
   Trajectory poses;
   /// What they are poses of.
   std::string frame;
@@ -316,6 +242,13 @@ void require_subscribers(ScanPublisher& publisher, const ReplayArguments& argume
 }
 
 void require_lossless(const dds::ServerStatus& status) {
+  for (const dds::Diagnostic& diagnostic : status.diagnostics) {
+    if (!dds::is_of_namesake(diagnostic)) continue;
+    throw std::invalid_argument(diagnostic.what +
+                                ": either may answer what it has mapped, so a lossless replay "
+                                "cannot be counted; " +
+                                diagnostic.hint);
+  }
   if (status.delivery == DeliveryMode::every) return;
   throw std::invalid_argument(
       "the server drops scans when they come too fast (input delivery: latest), so the replay "
@@ -357,7 +290,11 @@ ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
   SensorFeeds feeds{SampleFeed(dataset.imu()), SampleFeed(dataset.gnss())};
   const bool has_imu = !feeds.imu.empty();
   Client client = connect(arguments.client);
-  PoseLog poses(client);
+  ReplayPoses poses;
+  const Subscription odometry =
+      client.subscribe_odometry([&poses](const OdometryUpdate& update) { poses.take(update); });
+  const Subscription path =
+      client.subscribe_path([&poses](const Trajectory& poses_map) { poses.take(poses_map); });
   ScanPublisher publisher(client, {.dds = arguments.client.dds(DdsRole::sensor),
                                    .points_topic = arguments.topic,
                                    .imu_topic = has_imu ? arguments.imu_topic : "",
@@ -370,6 +307,8 @@ ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
   if (has_imu) (void)publisher.wait_for_imu_subscriber(imu_patience);
   const dds::ServerStatus before = client.status();
   if (arguments.lossless) require_lossless(before);
+  if (before.map_version > 0) poses.wait_for_path(path_patience);
+  poses.begin();
   ReplayOutcome outcome;
   outcome.replay = publish_with_progress(dataset, std::move(feeds), arguments, publisher, stop);
   const std::vector<std::int64_t>& stamps_ns = outcome.replay.published_stamps_ns;
@@ -382,6 +321,7 @@ ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
   const dds::ServerStatus after =
       wait_until_mapped(client, before, stamps_ns.size(), idle_timeout, stop);
   outcome.server = counts_since(before, after);
+  outcome.server_takes_topic = before.points_topic == arguments.topic;
   if (outcome.server->is_restarted)
     std::cerr << "stillmap: the server was restarted during the replay: what it counted before is "
                  "lost\n";
@@ -417,6 +357,28 @@ std::string describe(const ReplayOutcome& outcome) {
          "; " + std::to_string(outcome.poses.size()) + " poses came back\n";
 }
 
+constexpr const char* no_scan_twice =
+    "A server takes no scan twice: 'stillmap reset' makes it start over";
+
+/// Whether the server mapped what was to be mapped; says why not. A lossy replay may lose scans,
+/// but not all.
+bool is_success(const ReplayArguments& arguments, const ReplayOutcome& outcome) {
+  const std::size_t published = outcome.replay.published_stamps_ns.size();
+  const std::uint64_t mapped = outcome.server->mapped;
+  const bool is_complete = mapped >= published && outcome.poses.size() == published;
+  if (arguments.lossless && !is_complete) {
+    std::cerr << "stillmap: the replay was to be lossless, but the server mapped " << mapped
+              << " of " << published << " scans, and " << outcome.poses.size()
+              << " poses came back; 'stillmap status' counts why. " << no_scan_twice << "\n";
+    return false;
+  }
+  const bool were_for_it = outcome.server_takes_topic || outcome.server->dropped > 0;
+  if (mapped > 0 || published == 0 || !were_for_it) return true;
+  std::cerr << "stillmap: the server mapped none of the " << published
+            << " scans; 'stillmap status' counts why. " << no_scan_twice << "\n";
+  return false;
+}
+
 ExitCode run(const ReplayArguments& arguments) {
   StopSignal stop;
   const ReplayOutcome outcome = replay(arguments, stop);
@@ -426,18 +388,8 @@ ExitCode run(const ReplayArguments& arguments) {
     std::cout << "poses written to " << arguments.out << " (frame '" << outcome.frame
               << "'; the map is its place at the server's first scan)\n";
   }
-  const std::size_t published = outcome.replay.published_stamps_ns.size();
   if (!outcome.server || outcome.replay.stopped) return ExitCode::failed;
-  const std::uint64_t mapped = outcome.server->mapped;
-  const bool complete = mapped >= published && outcome.poses.size() == published;
-  if (arguments.lossless && !complete) {
-    std::cerr << "stillmap: the replay was to be lossless, but the server mapped " << mapped
-              << " of " << published << " scans, and " << outcome.poses.size()
-              << " poses came back; 'stillmap status' counts why. A server takes no scan twice: "
-                 "'stillmap reset' makes it start over\n";
-    return ExitCode::failed;
-  }
-  return ExitCode::ok;
+  return is_success(arguments, outcome) ? ExitCode::ok : ExitCode::failed;
 }
 
 }  // namespace
@@ -493,7 +445,8 @@ void add_replay_command(CommandHandle program, Action& action) {
       "  stillmap replay city --mount 1.2,0,1.4,0,15,0   # for mount: {source: tf_static}\n"
       "Of a pause in the recording, 10 s are waited at most.\n"
       "Ends when the server has processed what was sent, and prints the counts. Exit code 1\n"
-      "when a lossless replay lost something, 3 when no server answers or it stops taking scans.");
+      "when a lossless replay lost something or none was mapped, 3 when no server answers or it "
+      "stops taking scans.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
