@@ -76,7 +76,7 @@ Json pose_json(const OdometryUpdate& update) {
 std::string status_line(const dds::ServerStatus& status, const std::optional<StampedPose>& newest) {
   std::string line;
   if (!newest) {
-    line = "no pose yet";
+    line = status.counter("scans_mapped") > 0 ? "no new pose" : "no pose yet";
   } else {
     const Eigen::Isometry3d& T = newest->T_map_lidar;
     line = "x " + fixed(T.translation().x(), 2) + "  y " + fixed(T.translation().y(), 2) + "  z " +

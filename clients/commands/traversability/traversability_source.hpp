@@ -37,7 +37,7 @@ class TraversabilitySource {
   [[nodiscard]] virtual PathCheck check(PathQuery query) = 0;
   [[nodiscard]] virtual NearestTraversable nearest(const Eigen::Vector2d& position_map,
                                                    double max_distance_m) = 0;
-  /// Poses of the lidar. Throws ServiceTimeout when a server sends none in time.
+  /// Poses of the lidar. Throws as fetch_trajectory does when a server has none.
   [[nodiscard]] virtual Trajectory trajectory() = 0;
   /// Cost of computing the whole map; nothing for a server, which keeps it up to date.
   [[nodiscard]] virtual std::optional<TraversabilityUpdate> update_stats() const = 0;
