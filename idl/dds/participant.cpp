@@ -16,6 +16,7 @@
 
 #include "idl/dds/discovery.hpp"
 #include "idl/dds/discovery_monitor.hpp"
+#include "idl/dds/interfaces.hpp"
 #include "idl/dds/qos.hpp"
 #include "idl/dds/ros_graph.hpp"
 #include "idl/dds/ros_nodes.hpp"
@@ -137,6 +138,10 @@ Participant::Handle Participant::join() {
   if (options_.domain_id > max_domain_id) {
     throw failure("domain ids go from 0 to " + std::to_string(max_domain_id));
   }
+  if (const std::string fault = unknown_interfaces(options_.interfaces, own_addresses());
+      !fault.empty()) {
+    throw failure(fault);
+  }
   DomainParticipant* const made = [&] {
     // Of two threads of this process, the second must find the ports of the first one's used: no
     // two of a process may have the same number.
@@ -146,9 +151,9 @@ Participant::Handle Participant::join() {
                                         monitor_.get(), StatusMask::none());
   }();
   if (made == nullptr) {
-    throw failure("Fast DDS made no participant; check that the interfaces exist on this machine " +
-                  std::string("(`ip address`), that /dev/shm can be written, and that no other ") +
-                  "process listens at a port that was given");
+    throw failure(
+        "Fast DDS made no participant; check that /dev/shm can be written, and that no "
+        "other process listens at a port that was given");
   }
   if (options_.transport == NetworkTransport::tcp && options_.listening_port != 0) {
     set_tcp_user_timeout(options_.listening_port, tcp_user_timeout);
