@@ -2,10 +2,12 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <filesystem>
 #include <iostream>
 #include <map>
 #include <optional>
 #include <string>
+#include <system_error>
 
 #include "config/loaders/listening_address.hpp"
 #include "config/loaders/model_file.hpp"
@@ -76,6 +78,17 @@ void add_operation_options(CLI::App& program, OperationArguments& operation) {
       ->check(listening_address_fault);
 }
 
+/// What would keep the server from its map file on this machine; the file may be meant for another.
+void warn_of_map_folder(const ServerConfig& config) {
+  if (config.map.file.empty()) return;
+  const std::filesystem::path folder = std::filesystem::absolute(config.map.file).parent_path();
+  std::error_code unknown;
+  if (std::filesystem::is_directory(folder, unknown)) return;
+  std::cerr << "map.file: the folder " << folder.string()
+            << " is not there on this machine, where the server would not start: make it, or is a "
+               "disk not mounted?\n";
+}
+
 /// Throws ConfigError with every fault, ModelError or SecurityError.
 Arguments check_config(const std::string& file) {
   ConfigReport report;
@@ -90,6 +103,7 @@ Arguments check_config(const std::string& file) {
              .warnings)
       std::cerr << warning << "\n";
   }
+  warn_of_map_folder(config);
   std::cout << file << " can be used; labels by " << labels->name() << "\n";
   if (report.changed.empty()) std::cout << "all is as by default\n";
   for (const std::string& field : report.changed) std::cout << "not the default: " << field << "\n";

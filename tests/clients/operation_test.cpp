@@ -258,6 +258,10 @@ TEST_F(OperationTest, ChecksAConfigurationWithoutStarting) {
   EXPECT_EQ(check("good.yaml"), 0) << content("check.log");
   EXPECT_THAT(content("check.log"),
               AllOf(HasSubstr("can be used"), HasSubstr("not the default: sensor")));
+  EXPECT_THAT(content("check.log"), Not(HasSubstr("map.file")));
+  write("good.yaml", "labels: {source: none}\nmap: {file: unmounted/city.stillmap}\n");
+  EXPECT_EQ(check("good.yaml"), 0) << content("check.log");
+  EXPECT_THAT(content("check.log"), AllOf(HasSubstr("map.file"), HasSubstr("unmounted")));
   EXPECT_EQ(check("bad.yaml"), 2);
   EXPECT_THAT(content("check.log"), AllOf(HasSubstr("vlp_61"), HasSubstr("save_period_s"),
                                           HasSubstr("metrics.address"), HasSubstr("log.level")));
