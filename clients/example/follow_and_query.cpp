@@ -5,9 +5,12 @@
 #include <thread>
 
 #include "clients/library/client.hpp"
+#include "idl/dds/ros_domain.hpp"
 
 int main() try {
-  stillmap::Client client;  // domain 0, server "stillmap"
+  stillmap::ClientOptions options;  // server "stillmap"
+  options.dds.domain_id = stillmap::dds::ros_domain_id();
+  stillmap::Client client(options);
   client.wait_for_server(std::chrono::seconds(10));
 
   std::mutex mutex;

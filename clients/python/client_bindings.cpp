@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <mutex>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
 
 #include "clients/library/client.hpp"
@@ -14,6 +15,7 @@
 #include "clients/python/map.hpp"
 #include "clients/python/traversability.hpp"
 #include "config/loaders/dds_profile.hpp"
+#include "idl/dds/ros_domain.hpp"
 
 namespace stillmap::python {
 namespace {
@@ -43,7 +45,7 @@ bool wait_for(double timeout_s, std::chrono::milliseconds max_slice, Wait wait) 
   }
 }
 
-std::unique_ptr<Client> connect(std::uint32_t domain, const std::string& server,
+std::unique_ptr<Client> connect(std::optional<std::uint32_t> domain, const std::string& server,
                                 const std::string& profile,
                                 const std::vector<std::string>& interfaces,
                                 const std::vector<std::string>& peers,
@@ -60,7 +62,7 @@ std::unique_ptr<Client> connect(std::uint32_t domain, const std::string& server,
   ClientOptions options{.dds = dds_options(network, DdsRole::client),
                         .server_name = server,
                         .request_timeout = duration_of(timeout_s)};
-  options.dds.domain_id = domain;
+  options.dds.domain_id = domain ? *domain : dds::ros_domain_id();
   options.dds.security = security.value_or("");
   auto client = std::make_unique<Client>(options);
   std::string fault;
@@ -312,11 +314,12 @@ void bind_client(py::module_& module) {
                             "wait for the answer without the interpreter's lock; they raise "
                             "ServiceTimeout without one, ServiceError for a refusal.");
   client
-      .def(py::init(&connect), py::arg("domain") = 0, py::arg("server") = "stillmap",
+      .def(py::init(&connect), py::arg("domain") = py::none(), py::arg("server") = "stillmap",
            py::arg("profile") = "lan", py::arg("interfaces") = std::vector<std::string>{},
            py::arg("peers") = std::vector<std::string>{}, py::arg("discovery_server") = "",
            py::arg("security") = py::none(), py::arg("timeout_s") = 5.0,
-           "Joins the DDS domain and waits for the server. server: first part of its topic names. "
+           "Joins the DDS domain (else that of ROS_DOMAIN_ID, else 0) and waits for the server. "
+           "server: first part of its topic names. "
            "profile: kind of network (host, lan, wifi, wan, no_multicast, or a file). security: "
            "folder of our identity in a secured domain. Raises ConfigError, DdsError, "
            "ServiceTimeout.")

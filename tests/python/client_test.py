@@ -114,6 +114,19 @@ def test_no_server_is_an_exception_that_names_the_domain(free_domain):
         stillmap.Client(domain=free_domain, profile="pigeon")
 
 
+def test_without_a_domain_it_is_that_of_ros_domain_id(client, domain, monkeypatch):
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    assert stillmap.Client(timeout_s=PATIENCE_S).status()["map_id"] == client.status()["map_id"]
+    monkeypatch.setenv("ROS_DOMAIN_ID", "robot")
+    with pytest.raises(stillmap.DdsError, match="ROS_DOMAIN_ID"):
+        stillmap.Client(timeout_s=0.5)
+
+
+def test_an_interface_that_the_machine_lacks_is_named_at_once(domain):
+    with pytest.raises(stillmap.DdsError, match="203.0.113.9 is no address"):
+        stillmap.Client(domain=domain, interfaces=["203.0.113.9"], timeout_s=PATIENCE_S)
+
+
 def test_a_region_that_cannot_be_used_is_refused_in_words(client):
     with pytest.raises(ValueError, match="radius"):
         client.query(stillmap.Sphere([0, 0, 0], -1.0))
