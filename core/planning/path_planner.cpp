@@ -77,7 +77,7 @@ PathPlan blocked(const TraversabilityView& view, PlanStatus status, const Goal& 
   if (nearby.status == TraversabilityStatus::ok) {
     plan.nearby = nearby;
     text << "; the nearest free place is " << text_of(nearby.position_map) << ", "
-         << nearby.distance_m << " m away";
+         << std::round(10.0 * nearby.distance_m) / 10.0 << " m away";
   }
   plan.reason = text.str();
   return plan;

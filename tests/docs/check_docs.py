@@ -12,7 +12,8 @@ that follow <!-- file: PATH -->; README.md's size.
 Prints FILE:LINE and what is wrong; exit code 1 when anything is.
 
 In a page, a YAML block is a part of a server file unless its info string names another kind
-("yaml dds", "yaml sensor", "yaml robot", "yaml training"; "yaml prometheus" is not checked).
+("yaml dds", "yaml sensor", "yaml robot", "yaml training"; "yaml prometheus" and "yaml nav2" are
+not checked).
 """
 import argparse
 import functools

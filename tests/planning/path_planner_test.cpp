@@ -114,7 +114,8 @@ TEST(PathPlanner, ABlockedStartOrGoalHasAConflictAndTheNearestFreeCell) {
   EXPECT_EQ(on_wall.conflict->reason, BlockReason::obstacle);
   ASSERT_TRUE(on_wall.nearby);
   EXPECT_LT(on_wall.nearby->distance_m, 2.5);
-  EXPECT_THAT(on_wall.reason, HasSubstr("obstacle"));
+  EXPECT_THAT(on_wall.reason,
+              AllOf(HasSubstr("obstacle"), ContainsRegex(", [0-9]+([.][0-9])? m away")));
   const PathPlan to_unknown = plan_path(*view, {{30, 3}, {}}, {{30, 20}, {}});
   EXPECT_EQ(to_unknown.status, PlanStatus::goal_blocked);
   EXPECT_THAT(to_unknown.reason, HasSubstr("unknown"));
