@@ -52,6 +52,18 @@ std::string marked_number(const std::string& word) {
   return is_number ? " " + word : word;
 }
 
+/// A number, or several with commas between.
+bool is_numbers(const std::string& word) {
+  std::istringstream parts(word);
+  bool is_some = false;
+  for (std::string part; std::getline(parts, part, ',');) {
+    double number = 0.0;
+    if (!CLI::detail::lexical_cast(part, number)) return false;
+    is_some = true;
+  }
+  return is_some;
+}
+
 /// Letters to change, add, leave out, or swap with the next between two words (Damerau).
 std::size_t edits_between(const std::string& a, const std::string& b) {
   std::vector<std::size_t> before(b.size() + 1);
@@ -97,6 +109,27 @@ const CLI::App* command_of(const CLI::App& app, const std::string& name) {
   const auto found =
       app.get_subcommands([&](const CLI::App* command) { return command->get_name() == name; });
   return found.empty() ? nullptr : found.front();
+}
+
+/// CLI11 takes all words up to the next option for a list, also for one of a fixed length. A list
+/// of numbers ends before a last word that is none: that word goes before the options, where it is
+/// a value by its place.
+void end_lists_of_numbers(const CLI::App& program, std::vector<std::string>& words) {
+  const CLI::App* app = &program;
+  const auto is_option = [](const std::string& word) { return word.starts_with('-'); };
+  auto place = words.begin() + 1;
+  for (; place != words.end() && !is_option(*place); ++place) {
+    if (const CLI::App* const command = command_of(*app, *place)) app = command;
+  }
+  for (auto word = place; word != words.end() && *word != "--"; ++word) {
+    const CLI::Option* const option = is_option(*word) ? app->get_option_no_throw(*word) : nullptr;
+    if (option == nullptr || option->get_expected_max() <= 1) continue;
+    const auto last = std::find_if_not(word + 1, words.end(), is_numbers);
+    const bool is_value = last != words.end() && last != word + 1 && !is_option(*last);
+    if (!is_value || (last + 1 != words.end() && !is_option(*(last + 1)))) continue;
+    place = std::rotate(place, last, last + 1);
+    word = last;
+  }
 }
 
 std::vector<std::string> option_names(const CLI::App& app) {
@@ -168,6 +201,13 @@ OptionHandle OptionHandle::one_of(const std::vector<std::string>& values) {
   return *this;
 }
 
+OptionHandle OptionHandle::ends_in(const std::string& ending) {
+  option_->check([ending](const std::string& word) {
+    return word.ends_with(ending) ? std::string() : "'" + word + "' must end in " + ending;
+  });
+  return *this;
+}
+
 OptionHandle OptionHandle::above_zero() {
   constexpr double no_limit = std::numeric_limits<double>::infinity();
   option_->check([](const std::string& word) { return fault_of_positive(word, no_limit); },
@@ -200,6 +240,11 @@ OptionHandle OptionHandle::between(int low, int high) {
 
 OptionHandle OptionHandle::exactly(int values) {
   option_->expected(values);
+  return *this;
+}
+
+OptionHandle OptionHandle::up_to(int values) {
+  option_->expected(1, values);
   return *this;
 }
 
@@ -306,6 +351,7 @@ CommandLine::Parsed CommandLine::parse(int argc, char** argv) {
   for (std::size_t i = 1; i < words.size() && words[i] != "--"; ++i) {
     words[i] = marked_number(words[i]);
   }
+  end_lists_of_numbers(*app_, words);
   std::vector<const char*> marked;
   marked.reserve(words.size());
   for (const std::string& word : words) marked.push_back(word.c_str());

@@ -28,6 +28,8 @@ class OptionHandle {
   /// empty.
   OptionHandle corrected(const std::function<std::string(std::string&)>& correct);
   OptionHandle one_of(const std::vector<std::string>& values);
+  /// The name of a file with this ending, as ".png".
+  OptionHandle ends_in(const std::string& ending);
   OptionHandle above_zero();
   /// Above zero, and so much at most, which the help shows.
   OptionHandle above_zero_to(int most);
@@ -35,6 +37,8 @@ class OptionHandle {
   OptionHandle between(int low, int high);
   /// A list of exactly so many values.
   OptionHandle exactly(int values);
+  /// A list of one value or more, at most so many.
+  OptionHandle up_to(int values);
   /// A list may be written as one word: a,b,c.
   OptionHandle comma_separated();
   /// Each value of a list has the option's name before it: words that follow are no values of it.
@@ -55,7 +59,8 @@ class CommandHandle {
  public:
   explicit CommandHandle(CLI::App& app) : app_(&app) {}
 
-  /// `names` as "--count,-c", or "NAME" for a value by its place.
+  /// `names` as "--count,-c", or "NAME" for a value by its place, or both: "NAME,--name". A value
+  /// by its place may come after a list of numbers.
   OptionHandle option(const std::string& names, std::string& value, const std::string& help);
   OptionHandle option(const std::string& names, double& value, const std::string& help);
   OptionHandle option(const std::string& names, int& value, const std::string& help);

@@ -50,6 +50,59 @@ TEST(CommandLine, OtherWordsWithAMinusStayOptions) {
   }
 }
 
+TEST(CommandLine, AListOfNumbersEndsBeforeALastWordThatIsNone) {
+  const std::vector<std::vector<std::string>> spellings{
+      {"ask", "city.map", "--path", "0", "0", "-3", "4.5"},
+      {"ask", "--path", "0", "0", "-3", "4.5", "city.map"},
+      {"ask", "--path", "0,0", "-3,4.5", "city.map", "--json"},
+      {"ask", "--at", "1", "-2", "city.map", "--path", "0", "0", "-3", "4.5"},
+      {"ask", "--to", "1,-2", "city.map", "--path", "0", "0", "-3", "4.5"},
+      {"ask", "--path", "0,0,-3,4.5", "--map", "city.map"}};
+  for (const std::vector<std::string>& words : spellings) {
+    CommandLine line("program", "1", "help");
+    std::string map;
+    std::vector<double> path;
+    std::vector<std::string> to;
+    std::vector<double> at;
+    bool json = false;
+    CommandHandle ask = line.root().command("ask", "");
+    ask.option("MAPFILE,--map", map, "");
+    ask.option("--path", path, "").comma_separated();
+    ask.option("--to", to, "").up_to(3);
+    ask.option("--at", at, "").exactly(2).comma_separated();
+    ask.flag("--json", json, "");
+    ASSERT_EQ(parse(line, words), CommandLine::Parsed::command) << words[1];
+    EXPECT_EQ(map, "city.map");
+    EXPECT_THAT(path, ElementsAre(0.0, 0.0, -3.0, 4.5));
+  }
+}
+
+TEST(CommandLine, WordsOfAListStayInIt) {
+  CommandLine line("program", "1", "help");
+  std::string map;
+  std::vector<std::string> classes, points;
+  line.root().option("MAPFILE", map, "");
+  line.root().option("--classes", classes, "");
+  line.root().option("--points", points, "");
+  ASSERT_EQ(parse(line, {"--classes", "road", "sidewalk", "--points", "0", "x", "1"}),
+            CommandLine::Parsed::command);
+  EXPECT_THAT(classes, ElementsAre("road", "sidewalk"));
+  EXPECT_THAT(points, ElementsAre("0", "x", "1"));
+  EXPECT_EQ(map, "");
+}
+
+TEST(CommandLine, AFileNameEndsAsItMust) {
+  for (const char* name : {"map.png", "map.jpg", "png"}) {
+    CommandLine line("program", "1", "help");
+    std::string picture;
+    line.root().option("--picture", picture, "").ends_in(".png");
+    const bool is_right = std::string(name) == "map.png";
+    EXPECT_EQ(parse(line, {"--picture", name}),
+              is_right ? CommandLine::Parsed::command : CommandLine::Parsed::wrong_usage)
+        << name;
+  }
+}
+
 /// What is printed of wrong usage.
 std::string fault_of(const std::vector<std::string>& words) {
   CommandLine line("program", "1", "help");

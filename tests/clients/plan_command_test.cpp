@@ -43,6 +43,24 @@ TEST_F(PlanCommandTest, WithoutAPathItSaysWhyWithItsOwnExitCode) {
   EXPECT_EQ(run(on_map() + "--from 1,0,0 --to 1e9,0").exit_code, 2);
 }
 
+TEST_F(PlanCommandTest, WithoutAPathThatOfAnEarlierRunStays) {
+  make_map();
+  const std::string blocked =
+      "plan --profile car --map " + path("out/map.stillmap") + " --from 1,0,0 --to 900,0";
+  for (const char* name : {"path.csv", "path.json"}) {
+    const std::string into = " --output " + path(name);
+    ASSERT_EQ(run(blocked + into).exit_code, 4);
+    EXPECT_FALSE(exists(name));
+    ASSERT_EQ(run(on_map() + "--from 1,0,0 --to 9,0" + into).exit_code, 0);
+    const std::string found = content(name);
+    const ProcessResult none = run(blocked + into);
+    EXPECT_EQ(none.exit_code, 4);
+    EXPECT_THAT(none.err, HasSubstr("stays as it was"));
+    EXPECT_EQ(content(name), found);
+    EXPECT_FALSE(exists(std::string(name) + ".unfinished"));
+  }
+}
+
 TEST_F(PlanCommandTest, RefusesWhatItCannotUseBeforeTheWork) {
   const auto refusal = [&](const std::string& arguments) {
     const ProcessResult result = run("plan " + arguments);

@@ -17,6 +17,7 @@ using enum SemanticClass;
 using test::square_robot;
 using test::traversability_of;
 using test::VoxelWorld;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 
 using test::pi;

@@ -107,7 +107,7 @@ void add_dataset_sensor_command(CommandHandle dataset, Action& action) {
   CommandHandle command = dataset.command("sensor", "Find out which sensor recorded a data set");
   command.option("DATASET", arguments->dataset, dataset_kinds).required();
   command.option("--topic-in", arguments->topic, topic_in_help);
-  command.option("--out", arguments->out, "Write a sensor file (YAML) for the server");
+  command.option("--out,--output,-o", arguments->out, "Write a sensor file (YAML) for the server");
   command.flag("--calibrate", arguments->calibrates,
                "Find by how much the vertical angles are off, by driving several times");
   command.option("--scans", arguments->scans, "Scans to calibrate by")

@@ -214,6 +214,7 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
   command
       .option("--picture", arguments->picture,
               "PNG of the first scan's range image: true classes above those that the model found")
+      .ends_in(".png")
       .excludes(predictions);
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(

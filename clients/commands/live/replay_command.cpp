@@ -408,7 +408,7 @@ void add_replay_command(CommandHandle program, Action& action) {
   command.flag("--lossless", arguments->lossless,
                "Wait for the server instead of letting it drop scans (its input delivery "
                "must be 'every')");
-  command.option("--out", arguments->out,
+  command.option("--out,--output,-o", arguments->out,
                  "Write the poses that came back: KITTI 3x4, or with stamps to FILE.tum");
   command.option("--start", replay.range.first, "Number of the first scan");
   command.option("--scans,--count", replay.range.count, "Take as many scans at most");

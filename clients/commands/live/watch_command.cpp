@@ -176,7 +176,8 @@ void add_watch_command(CommandHandle program, Action& action) {
       program.command("watch", "Poses, health and rates of a server as they come");
   command.option("--count", arguments->count, "End after as many poses");
   command.option("--duration", arguments->duration_s, "End after as many seconds").above_zero();
-  command.option("--out", arguments->out, "Write the poses: KITTI 3x4, or with stamps to FILE.tum");
+  command.option("--out,--output,-o", arguments->out,
+                 "Write the poses: KITTI 3x4, or with stamps to FILE.tum");
   command.flag("--json", arguments->json, "Print a JSON line for every pose and status");
   add_client_options(command, arguments->client);
   command.explain(

@@ -77,7 +77,7 @@ void add_map_check_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<MapCheckArguments>();
   CommandHandle command =
       program.command("map-check", "Verify a map file: its database, every tile's hash, the path");
-  command.option("FILE", arguments->file, "A map file; it is only read").required();
+  command.option("FILE,--map", arguments->file, "A map file; it is only read").required();
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"

@@ -156,9 +156,10 @@ void add_map_diff_command(CommandHandle program, Action& action) {
           "A voxel counts as removed, or new, only when the other map has none so many cells away")
       .between(0, MapDiffOptions::max_tolerance_voxels)
       .with_default();
-  command.option(
-      "--picture", arguments->picture,
-      "Draw it from above, to FILE.png: appeared green, removed red, another class yellow");
+  command
+      .option("--picture", arguments->picture,
+              "Draw it from above, to FILE.png: appeared green, removed red, another class yellow")
+      .ends_in(".png");
   command.flag("--json", arguments->json, "Print JSON, with all tiles");
   command.explain(
       "Examples:\n"

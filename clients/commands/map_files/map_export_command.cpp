@@ -131,9 +131,9 @@ void add_map_export_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<MapExportArguments>();
   CommandHandle command =
       program.command("map-export", "Write a map file, or a part of it, as PCD, PLY or GeoTIFF");
-  command.option("FILE", arguments->file, "A map file; it is only read").required();
+  command.option("FILE,--map", arguments->file, "A map file; it is only read").required();
   command
-      .option("--output,-o", arguments->output,
+      .option("--output,--out,-o", arguments->output,
               "FILE.pcd or FILE.ply: a point a voxel, with class and colour; FILE.tif: from above, "
               "classes there and heights in FILE_height.tif")
       .required();

@@ -166,7 +166,7 @@ void add_map_info_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<MapInfoArguments>();
   CommandHandle command =
       program.command("map-info", "Say what a map file holds: sizes, classes, bounds, path, times");
-  command.option("FILE", arguments->file, "A map file; it is only read").required();
+  command.option("FILE,--map", arguments->file, "A map file; it is only read").required();
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"

@@ -184,7 +184,8 @@ void add_merge_command(CommandHandle program, Action& action) {
   command.option("MAP", arguments->map, "A map file; the result is in its frame").required();
   command.option("OTHER", arguments->other, "Another map file, made apart; it needs its path")
       .required();
-  command.option("--out", arguments->out, "Where the map of both is written").required();
+  command.option("--out,--output,-o", arguments->out, "Where the map of both is written")
+      .required();
   command.option("--config", arguments->config_file,
                  "Server file that the maps were made with: when a voxel is shown (static_map) is "
                  "in no map");

@@ -113,13 +113,14 @@ void add_sessions_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<SessionsArguments>();
   CommandHandle command = program.command(
       "sessions", "List the drives that a map file is made of, and withdraw the newest");
-  command.option("FILE", arguments->file, "A map file; it is only read").required();
+  command.option("FILE,--map", arguments->file, "A map file; it is only read").required();
   const OptionHandle withdraw =
       command
           .option("--withdraw", arguments->withdraw,
                   "Number of the newest session: write the map as it was before it")
           .above_zero();
-  command.option("--out", arguments->out, "Where the map without the session is written")
+  command
+      .option("--out,--output,-o", arguments->out, "Where the map without the session is written")
       .needs(withdraw);
   command.flag("--force", arguments->force, "Replace the file --out where it exists")
       .needs(withdraw);

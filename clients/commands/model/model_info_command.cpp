@@ -141,7 +141,7 @@ void add_model_run_command(CommandHandle model, Action& action) {
           "Images, one after the other: channels x rows x columns of 32-bit floats (little-endian)")
       .required();
   command
-      .option("--output", arguments->output,
+      .option("--output,--out,-o", arguments->output,
               "File for the probabilities: classes x rows x columns of 32-bit floats an image")
       .required();
   command.explain(

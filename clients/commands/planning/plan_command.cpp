@@ -21,8 +21,8 @@ namespace {
 struct PlanArguments {
   ClientArguments client;
   std::string map;
-  std::string from;
-  std::string to;
+  std::vector<std::string> from;
+  std::vector<std::string> to;
   std::string profile = "car";
   bool through_unknown = false;
   double time_limit_s = 2.0;
@@ -39,8 +39,10 @@ struct PlanArguments {
   bool json = false;
 };
 
-/// "x,y" or "x,y,heading": metres and degrees.
-Goal place_of(const std::string& option, const std::string& text) {
+/// "x,y" or "x,y,heading", in one word or several: metres and degrees.
+Goal place_of(const std::string& option, const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ",") + word;
   std::vector<double> values;
   const char* at = text.data();
   const char* const end = at + text.size();
@@ -95,8 +97,6 @@ PlanTask task_of(const PlanArguments& arguments) {
 /// Refuses file names that cannot be written before the search, not after it.
 void check_files(const PlanArguments& arguments) {
   if (!arguments.output.empty()) check_plan_file(arguments.output);
-  if (arguments.picture.empty() || arguments.picture.ends_with(".png")) return;
-  throw std::invalid_argument("--picture " + arguments.picture + ": must end in .png");
 }
 
 void print(const PlanArguments& arguments, const TimedPlan& timed) {
@@ -107,15 +107,37 @@ void print(const PlanArguments& arguments, const TimedPlan& timed) {
   }
 }
 
-void show(const PlanArguments& arguments, const Replanner& replanner) {
-  print(arguments, replanner.last());
-  if (!arguments.output.empty()) write_plan(arguments.output, replanner.last());
-  if (arguments.picture.empty()) return;
-  const std::vector<PlanarPose> path_map = replanner.last().plan.path_map();
-  TraversabilityPictureOptions options;
-  options.path_map = path_map;
-  write_traversability_picture(arguments.picture, replanner.traversability(), options);
-}
+/// Prints plans, and writes and draws them where that was asked for.
+class PlanOutput {
+ public:
+  explicit PlanOutput(const PlanArguments& arguments) : arguments_(arguments) {}
+
+  void show(const Replanner& replanner) {
+    print(arguments_, replanner.last());
+    if (!arguments_.output.empty()) write(replanner.last());
+    if (arguments_.picture.empty()) return;
+    const std::vector<PlanarPose> path_map = replanner.last().plan.path_map();
+    TraversabilityPictureOptions options;
+    options.path_map = path_map;
+    write_traversability_picture(arguments_.picture, replanner.traversability(), options);
+  }
+
+ private:
+  /// Without a path the file of an earlier run stays; one of this run, which is blocked now, does
+  /// not: whoever reads it drives by it.
+  void write(const TimedPlan& timed) {
+    if (!timed.plan.is_found() && !has_written_) {
+      if (std::filesystem::exists(arguments_.output))
+        std::cerr << "stillmap: " << arguments_.output << " stays as it was: there is no path\n";
+      return;
+    }
+    write_plan(arguments_.output, timed);
+    has_written_ = true;
+  }
+
+  const PlanArguments& arguments_;
+  bool has_written_ = false;
+};
 
 ExitCode code_of(const TimedPlan& timed) {
   if (timed.plan.status == PlanStatus::invalid_request) return ExitCode::bad_input;
@@ -138,13 +160,13 @@ ExitCode plan_on_file(const PlanArguments& arguments) {
   }
   Replanner replanner(std::move(task));
   (void)replanner.plan(map.view, std::nullopt);
-  show(arguments, replanner);
+  PlanOutput(arguments).show(replanner);
   return code_of(replanner.last());
 }
 
 /// Plans again whenever the map requires it, until a limit is reached.
-void follow(const PlanArguments& arguments, Replanner& replanner, const TileMirror& mirror,
-            std::shared_ptr<const MapSnapshot> map,
+void follow(const PlanArguments& arguments, Replanner& replanner, PlanOutput& output,
+            const TileMirror& mirror, std::shared_ptr<const MapSnapshot> map,
             const std::optional<RobotPoseSubscription>& robot, StopSignal& stop) {
   const auto began = std::chrono::steady_clock::now();
   const auto is_over = [&](std::uint64_t plans) {
@@ -159,7 +181,7 @@ void follow(const PlanArguments& arguments, Replanner& replanner, const TileMirr
     if (!replanner.replan_if_needed(*map, robot ? std::optional(robot->pose()) : std::nullopt))
       continue;
     ++plans;
-    show(arguments, replanner);
+    output.show(replanner);
   }
 }
 
@@ -181,8 +203,9 @@ ExitCode plan_on_server(const PlanArguments& arguments) {
   Replanner replanner(std::move(task));
   const auto map = mirror.snapshot();
   (void)replanner.plan(*map, robot ? std::optional(robot->pose()) : std::nullopt);
-  show(arguments, replanner);
-  if (arguments.follow) follow(arguments, replanner, mirror, map, robot, stop);
+  PlanOutput output(arguments);
+  output.show(replanner);
+  if (arguments.follow) follow(arguments, replanner, output, mirror, map, robot, stop);
   return code_of(replanner.last());
 }
 
@@ -219,19 +242,23 @@ void add_plan_command(CommandHandle program, Action& action) {
   CommandHandle command =
       program.command("plan", "A path that a robot can drive, on a server's map or a stored one");
   command.option("--to", arguments->to, "Goal: x,y or x,y,heading, metres and degrees, map frame")
+      .up_to(3)
       .required();
-  command.option("--from", arguments->from,
-                 "Start, as --to; without it the robot's newest pose (of a server's map)");
+  command
+      .option("--from", arguments->from,
+              "Start, as --to; without it the robot's newest pose (of a server's map)")
+      .up_to(3);
   command
       .option("--profile", arguments->profile,
               "The robot: car, delivery_robot, tracked, or a file like config/robots/car.yaml")
       .with_default();
   command.flag("--through-unknown", arguments->through_unknown,
                "Unknown ground may be driven on; without it as the profile says");
-  command.option("--map", arguments->map, "Plan on a map file instead of a server's map");
-  command.option("--output", arguments->output, "Write the path to FILE.json or FILE.csv");
-  command.option("--picture", arguments->picture,
-                 "Draw the traversability and the path to FILE.png");
+  command.option("--map,MAPFILE", arguments->map, "Plan on a map file instead of a server's map");
+  command.option("--output,--out,-o", arguments->output, "Write the path to FILE.json or FILE.csv");
+  command
+      .option("--picture", arguments->picture, "Draw the traversability and the path to FILE.png")
+      .ends_in(".png");
   const OptionHandle follow =
       command.flag("--follow", arguments->follow,
                    "Stay subscribed and plan again when the path is blocked or the route changes; "
@@ -251,7 +278,9 @@ void add_plan_command(CommandHandle program, Action& action) {
       "The path keeps the robot's whole footprint on free cells and its turning radius\n"
       "(min_turning_radius_m of the profile); driving backwards costs three times as much.\n"
       "Exit code 4 when there is no path: start or goal is blocked, no route is known, or the\n"
-      "search ran out of time; with --follow, of the last plan.");
+      "search ran out of time; with --follow, of the last plan. Then the file of --output stays as "
+      "it\n"
+      "was, unless this run has written it: where the path of --follow is blocked, it has none.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

@@ -116,17 +116,21 @@ void check_plan_file(const std::filesystem::path& file) {
 
 void write_plan(const std::filesystem::path& file, const TimedPlan& timed) {
   check_plan_file(file);
-  std::ofstream out(file, std::ios::trunc);
+  // Beside it and moved: a reader finds a whole path, the earlier one or this.
+  const std::filesystem::path unfinished = file.string() + ".unfinished";
+  std::ofstream out(unfinished, std::ios::trunc);
   if (file.extension() == ".csv") {
     write_csv(out, timed.plan);
   } else {
     out << to_json(timed, true).dump(1) << '\n';
   }
-  out.flush();
-  if (!out) {
-    throw std::runtime_error(file.string() +
-                             ": cannot be written; its folder must exist and be writable");
-  }
+  out.close();
+  std::error_code fault;
+  if (out) std::filesystem::rename(unfinished, file, fault);
+  if (out && !fault) return;
+  std::filesystem::remove(unfinished, fault);
+  throw std::runtime_error(file.string() +
+                           ": cannot be written; its folder must exist and be writable");
 }
 
 }  // namespace stillmap::cli

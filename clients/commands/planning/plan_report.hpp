@@ -30,8 +30,9 @@ struct TimedPlan {
 /// One line, for --follow.
 [[nodiscard]] std::string one_line(const TimedPlan& timed);
 
-/// Writes the path: all of it to FILE.json, or one pose a line to FILE.csv. Throws
-/// std::invalid_argument for another ending, std::runtime_error when it cannot be written.
+/// Writes the path: all of it to FILE.json, or one pose a line to FILE.csv; what the file held
+/// stays until the new path is whole. Throws std::invalid_argument for another ending,
+/// std::runtime_error when it cannot be written.
 void write_plan(const std::filesystem::path& file, const TimedPlan& timed);
 
 /// Throws std::invalid_argument when write_plan would refuse the name.

@@ -303,10 +303,10 @@ void add_octomap_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<OctomapArguments>();
   CommandHandle command = program.command(
       "octomap", "Occupied, free and unknown space: queries, and files for octovis");
-  command.option("--output", arguments->output,
+  command.option("--output,--out,-o", arguments->output,
                  "Write the octree to FILE.bt (occupied and free) or FILE.ot (probabilities)");
   const OptionHandle map =
-      command.option("--map", arguments->map,
+      command.option("--map,MAPFILE", arguments->map,
                      "Take a stored map (.stillmap: its static voxels are occupied, all else is "
                      "unknown) or an OctoMap file (.bt, .ot) instead of a server");
   command
@@ -339,7 +339,7 @@ void add_octomap_command(CommandHandle program, Action& action) {
       "Examples:\n"
       "  stillmap octomap --output city.bt                     then: octovis city.bt\n"
       "  stillmap octomap --map city_map/map.stillmap --output city.ot\n"
-      "  stillmap octomap --point 5,0,0.5 --ray 0,0,0,1,0,0 --max-range 30\n"
+      "  stillmap octomap --point 5,0,0 --ray 0,0,0,1,0,0 --max-range 30\n"
       "  stillmap octomap --map city.bt --box -2,-2,0,2,2,2 --json\n"
       "Coordinates are in the map frame [m]. --point, --box and --ray may be given several times;\n"
       "without any, what the octree holds is printed. Free is only what a ray passed. Exit code 2\n"

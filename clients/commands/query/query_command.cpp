@@ -112,9 +112,11 @@ void add_query_command(CommandHandle program, Action& action) {
               "Id of the map that the version is of; default: the server's current map, which has "
               "another id after every start of the server")
       .needs(since_version);
-  command.option("--out", arguments->out, "Write the voxels to FILE.pcd or FILE.ply");
-  command.option("--picture", arguments->picture,
-                 "Draw the whole map from above, the path and the region, to FILE.png");
+  command.option("--out,--output,-o", arguments->out, "Write the voxels to FILE.pcd or FILE.ply");
+  command
+      .option("--picture", arguments->picture,
+              "Draw the whole map from above, the path and the region, to FILE.png")
+      .ends_in(".png");
   command
       .option("--repeat", arguments->repeat,
               "Repeat the query so many times; prints median and p99")

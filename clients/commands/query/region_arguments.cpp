@@ -109,11 +109,13 @@ struct Kinds {
 
 Kinds add_kinds(CommandHandle command, RegionArguments& region) {
   std::array kinds{
-      command.option("--box", region.box, "x_min y_min z_min x_max y_max z_max").exactly(6),
-      command.option("--around", region.around, "x y SIZE: a square").exactly(3),
+      command.option("--box", region.box, "x_min y_min z_min x_max y_max z_max")
+          .exactly(6)
+          .comma_separated(),
+      command.option("--around", region.around, "x y SIZE: a square").exactly(3).comma_separated(),
       command.option("--around-robot", region.around_robot_m, "SIZE: a square round the robot")
           .above_zero(),
-      command.option("--sphere", region.sphere, "x y z RADIUS").exactly(4),
+      command.option("--sphere", region.sphere, "x y z RADIUS").exactly(4).comma_separated(),
       command.option("--polygon", region.polygon,
                      "x y x y ...: corners round an outline; or FILE with a corner a line"),
       command.option("--corridor", region.corridor,
@@ -131,13 +133,17 @@ Kinds add_kinds(CommandHandle command, RegionArguments& region) {
 
 std::vector<Eigen::Vector2d> parse_points_2d(const std::string& option,
                                              const std::vector<std::string>& words) {
-  if (words.size() == 1 && !number(words[0])) return points_in_file(option, words[0]);
   std::vector<double> values;
   for (const std::string& word : words) {
-    const auto value = number(word);
-    if (!value) throw std::invalid_argument(option + ": '" + word + "' is not a number");
-    values.push_back(*value);
+    std::istringstream parts(word);
+    for (std::string part; std::getline(parts, part, ',');) {
+      const auto value = number(part);
+      if (!value && words.size() == 1) return points_in_file(option, word);
+      if (!value) throw std::invalid_argument(option + ": '" + word + "' is not a number");
+      values.push_back(*value);
+    }
   }
+  if (values.empty() && !words.empty()) return points_in_file(option, words.front());
   if (values.size() % 2 != 0) {
     throw std::invalid_argument(option + " has " + std::to_string(values.size()) +
                                 " numbers; give an x and a y for every point");

@@ -150,10 +150,12 @@ void add_removed_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<RemovedArguments>();
   CommandHandle command = program.command(
       "removed", "Voxels that are kept out of the static map, by reason; can restore them");
-  command.option("MAPFILE", arguments->map_file, "A map file instead of a server");
+  command.option("MAPFILE,--map", arguments->map_file, "A map file instead of a server");
   add_region_options(command, arguments->region);
-  command.option("--picture", arguments->picture,
-                 "Write a PNG: the map in grey, what was removed by reason");
+  command
+      .option("--picture", arguments->picture,
+              "Write a PNG: the map in grey, what was removed by reason")
+      .ends_in(".png");
   command.option("--restore", arguments->restore,
                  "Have the server show again what was removed for this reason in the box of --box, "
                  "--around or --around-robot: moving, semi-static, 'seen through' or relabelled");

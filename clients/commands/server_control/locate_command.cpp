@@ -89,7 +89,8 @@ void add_locate_command(CommandHandle program, Action& action) {
       "locate", "Ask a server where the robot is: look for its last scan in the whole map");
   command
       .option("--near", arguments->near, "X Y [m] and heading [degrees]: look near this pose alone")
-      .exactly(3);
+      .exactly(3)
+      .comma_separated();
   command.option("--radius", arguments->radius_m, "Look so far from it [m]")
       .above_zero_to(10'000)
       .with_default();

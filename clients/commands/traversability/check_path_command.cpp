@@ -1,5 +1,7 @@
+#include <cmath>
 #include <iostream>
 #include <memory>
+#include <numbers>
 #include <stdexcept>
 
 #include "clients/commands/command.hpp"
@@ -18,6 +20,11 @@ std::string at(const Eigen::Vector2d& position_map) {
       .append(", ")
       .append(fixed(position_map.y(), 2))
       .append(")");
+}
+
+/// As 'stillmap plan' has headings: -180 to 180.
+double heading_deg(const PlanarPose& pose) {
+  return std::remainder(pose.heading_rad, 2.0 * std::numbers::pi) * 180.0 / std::numbers::pi;
 }
 
 Json conflict_json(const PathConflict& conflict) {
@@ -60,7 +67,7 @@ std::string describe(const PathCheck& check, const std::string& profile) {
   return "blocked for " + profile + " after " + fixed(conflict.along_m, 1) +
          " m: " + std::string(name(conflict.reason)) + " at " + at(conflict.cell_centre_map) +
          ", touched by the robot at " + at(conflict.pose.position_map) + " with heading " +
-         fixed(conflict.pose.heading_rad, 2) + " rad, after position " +
+         fixed(heading_deg(conflict.pose), 0) + " degrees, after position " +
          std::to_string(conflict.segment) + "\n";
 }
 
@@ -95,9 +102,11 @@ void add_check_path_command(CommandHandle program, Action& action) {
       .option("--path", arguments->path,
               "x y x y ...: positions [m]; or FILE with a position a line")
       .required();
-  command.option("--headings", arguments->headings_rad,
-                 "One a position [rad], from x towards y; without, the robot drives straight from "
-                 "position to position and turns on the spot");
+  command
+      .option("--headings", arguments->headings_rad,
+              "One a position [rad], from x towards y; without, the robot drives straight from "
+              "position to position and turns on the spot")
+      .comma_separated();
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"

@@ -60,7 +60,10 @@ void add_nearest_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<NearestArguments>();
   CommandHandle command = program.command("nearest", "The nearest place where a robot can stand");
   add_traversability_source_options(command, arguments->source);
-  command.option("--to", arguments->position_map, "x y: the place [m]").exactly(2).required();
+  command.option("--to", arguments->position_map, "x y: the place [m]")
+      .exactly(2)
+      .comma_separated()
+      .required();
   command.option("--max-distance", arguments->max_distance_m, "Search no farther than this [m]")
       .above_zero()
       .with_default();

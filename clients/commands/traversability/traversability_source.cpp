@@ -95,7 +95,7 @@ class ServerSource final : public TraversabilitySource {
 
 void add_traversability_source_options(CommandHandle command,
                                        TraversabilitySourceArguments& arguments) {
-  command.option("MAPFILE", arguments.map_file,
+  command.option("MAPFILE,--map", arguments.map_file,
                  "Map file (map.stillmap of 'stillmap map'); without it, a server is asked");
   command
       .option("--profile", arguments.profile,

@@ -188,9 +188,10 @@ void add_traversable_command(CommandHandle program, Action& action) {
       "traversable", "Where a robot can drive, of a server or on a stored map, and why not");
   add_traversability_source_options(command, arguments->source);
   add_region_options_2d(command, arguments->region);
-  command.option("--out", arguments->out,
+  command.option("--out,--output,-o", arguments->out,
                  "Folder for Nav2's map_server: map.yaml and map.pgm; made if need be");
-  command.option("--picture", arguments->picture, "Draw the area and its reasons to FILE.png");
+  command.option("--picture", arguments->picture, "Draw the area and its reasons to FILE.png")
+      .ends_in(".png");
   command.option("--outlines", arguments->outlines,
                  "Write the outlines of free areas, with holes, to FILE.json (as GeoJSON, in [m])");
   command
