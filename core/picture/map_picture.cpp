@@ -189,6 +189,21 @@ void draw_closures(cv::Mat& picture, const PictureFrame& frame, const Trajectory
   }
 }
 
+/// A disc where the lidar was, and a line to where it looked.
+void draw_places(cv::Mat& picture, const PictureFrame& frame, const Trajectory& places) {
+  constexpr double radius_px = 6.0, line_px = 18.0;
+  for (const StampedPose& place : places) {
+    const cv::Point2d centre = frame.pixel(place.T_map_lidar.translation().head<2>());
+    const Eigen::Vector2d ahead = place.T_map_lidar.linear().col(0).head<2>();
+    const cv::Point2d tip = centre + line_px * cv::Point2d(ahead.x(), -ahead.y());
+    for (const double casing_px : {2.0, 0.0}) {
+      const cv::Scalar colour = casing_px > 0.0 ? cv::Scalar(0, 0, 0) : estimate_colour;
+      cv::line(picture, centre, tip, colour, 2 + cvRound(2.0 * casing_px), cv::LINE_AA);
+      cv::circle(picture, centre, cvRound(radius_px + casing_px), colour, cv::FILLED, cv::LINE_AA);
+    }
+  }
+}
+
 Eigen::AlignedBox2d extent(const MapSnapshot& view, const Trajectory& estimate,
                            const MapPictureOptions& options) {
   Eigen::AlignedBox2d box = xy_bounds(view);
@@ -236,14 +251,17 @@ ClassCounts count_classes(const MapSnapshot& view) {
   return counts;
 }
 
-std::string title(const MapSnapshot& view, const Trajectory& estimate) {
+std::string title(const MapSnapshot& view, const Trajectory& estimate,
+                  const MapPictureOptions& options) {
   if (view.tiles.empty()) return "The map is empty.";
   std::size_t voxels = 0;
   for (const auto& tile : view.tiles) voxels += tile->voxels.size();
   std::ostringstream text;
   text << with_thousands(voxels) << " voxels of " << view.voxel_size_m << " m in "
        << view.tiles.size() << " tiles";
-  if (!estimate.empty()) {
+  if (options.looked_for) {
+    text << ", " << estimate.size() << " of " << *options.looked_for << " found";
+  } else if (!estimate.empty()) {
     text << ", " << std::fixed << std::setprecision(0) << length_m(estimate) << " m driven";
   }
   return text.str();
@@ -252,7 +270,8 @@ std::string title(const MapSnapshot& view, const Trajectory& estimate) {
 std::vector<LegendEntry> legend_entries(const MapSnapshot& view, const Trajectory& estimate,
                                         const MapPictureOptions& options) {
   std::vector<LegendEntry> entries;
-  if (!estimate.empty()) entries.push_back({"trajectory", estimate_colour});
+  if (!estimate.empty())
+    entries.push_back({options.looked_for ? "found" : "trajectory", estimate_colour});
   if (options.truth) entries.push_back({"truth", truth_colour});
   if (!options.closures.empty()) entries.push_back({"closed loop", closure_colour});
   if (options.query_box_map) entries.push_back({"query", query_box_colour()});
@@ -276,15 +295,19 @@ void write_map_picture(const std::filesystem::path& file, const MapSnapshot& vie
   cv::Mat picture = draw_voxels(view, frame);
   if (options.query_box_map) draw_box(picture, frame, *options.query_box_map);
   if (options.truth) draw_trajectory(picture, frame, *options.truth, truth_colour);
-  draw_trajectory(picture, frame, estimate, estimate_colour);
-  draw_closures(picture, frame, estimate, options);
-  draw_ends(picture, frame, estimate);
+  if (options.looked_for) {
+    draw_places(picture, frame, estimate);
+  } else {
+    draw_trajectory(picture, frame, estimate, estimate_colour);
+    draw_closures(picture, frame, estimate, options);
+    draw_ends(picture, frame, estimate);
+  }
   draw_scale_bar(picture, frame.px_per_m);
 
-  cv::vconcat(
-      picture,
-      draw_legend(picture.cols, title(view, estimate), legend_entries(view, estimate, options)),
-      picture);
+  cv::vconcat(picture,
+              draw_legend(picture.cols, title(view, estimate, options),
+                          legend_entries(view, estimate, options)),
+              picture);
   write_png(file, picture);
 }
 

@@ -21,6 +21,9 @@ struct MapPictureOptions {
   std::vector<std::pair<std::size_t, std::size_t>> closures;
   /// Outline of a query; map frame [m], infinite faces end at the picture's edge.
   std::optional<Eigen::AlignedBox3d> query_box_map;
+  /// The estimate is no drive, but places found each by itself, of so many that were looked for: a
+  /// mark each, with its heading, and no line.
+  std::optional<std::size_t> looked_for;
 };
 
 /// Writes a PNG of the map from above, x to the right and y up: classes in SemanticKITTI's colours

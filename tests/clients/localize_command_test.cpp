@@ -80,7 +80,13 @@ TEST_F(LocalizeCommandTest, NamesWhatItCannotUse) {
   const ProcessResult no_scans = localize("nowhere");
   EXPECT_EQ(no_scans.exit_code, 2);
   EXPECT_THAT(no_scans.err, HasSubstr("nowhere"));
-  EXPECT_EQ(localize("city", "--start 1000").exit_code, 2);
+  const ProcessResult beyond = localize("city", "--start 1000");
+  EXPECT_EQ(beyond.exit_code, 2);
+  EXPECT_THAT(beyond.err, HasSubstr("; --start is 1000"));
+  const ProcessResult picture = localize("city", "--scans 1 --picture " + path("found.jpg"));
+  EXPECT_EQ(picture.exit_code, 2);
+  EXPECT_EQ(picture.out, "");
+  EXPECT_THAT(picture.err, HasSubstr(".png"));
 }
 
 TEST_F(LocalizeCommandTest, CountsScansThatItCannotRead) {

@@ -211,7 +211,7 @@ std::string describe(const std::vector<LocalizedScan>& scans, std::size_t skippe
          " ms, made searchable in " + fixed(map.index_ms, 0) + " ms\n";
 }
 
-/// The map with the poses that were found.
+/// The map with a mark for each pose that was found.
 void write_picture(const std::string& file, const std::vector<LocalizedScan>& scans,
                    const SearchableMap& map) {
   Trajectory found;
@@ -219,7 +219,9 @@ void write_picture(const std::string& file, const std::vector<LocalizedScan>& sc
     if (scan.result.status == LocalizationStatus::found)
       found.push_back({scan.stamp_ns, scan.result.places.front().T_map_lidar});
   }
-  write_map_picture(file, map.saved.view, found);
+  MapPictureOptions options;
+  options.looked_for = scans.size();
+  write_map_picture(file, map.saved.view, found, options);
 }
 
 ExitCode run(const LocalizeArguments& arguments) {
@@ -254,7 +256,7 @@ void add_localize_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<LocalizeArguments>();
   CommandHandle command = program.command(
       "localize", "Find scans in a map with no prior pose, each in the whole of it");
-  command.option("MAP", arguments->map, "A map file; it is only read").required();
+  command.option("MAP,--map", arguments->map, "A map file; it is only read").required();
   command.option("DATASET", arguments->dataset, dataset_kinds).required();
   add_recording_options(command, arguments->recording);
   add_mapper_options(command, arguments->mapper);
@@ -266,7 +268,10 @@ void add_localize_command(CommandHandle program, Action& action) {
   command.option("--step", arguments->step, "Every so many scans").above_zero().with_default();
   command.flag("--strict", arguments->range.strict,
                "Stop at the first damaged file instead of skipping it");
-  command.option("--picture", arguments->picture, "Draw map and found poses: a .png");
+  command
+      .option("--picture", arguments->picture,
+              "Draw the map, and a mark for each pose that was found, to FILE.png")
+      .ends_in(".png");
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"
@@ -279,7 +284,8 @@ void add_localize_command(CommandHandle program, Action& action) {
       "that. With --labels auto scans without labels are looked for by their geometry alone, and "
       "no\n"
       "network runs. The score is the product of both shares; runner-up is that of the next best "
-      "place.");
+      "place.\n"
+      "Exit code 0 however many are found: 'found' of --json tells.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
