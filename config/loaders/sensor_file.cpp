@@ -142,7 +142,9 @@ SensorModel load_sensor(const std::string& name_or_file, const fs::path& folder)
     std::vector<std::string> names;
     for (const auto& [name, make] : built_in_sensors()) names.push_back(name);
     throw ConfigError({"sensor '" + name_or_file + "' is neither built in nor a .yaml file" +
-                       did_you_mean(name_or_file, names)});
+                       did_you_mean(name_or_file, names) +
+                       " (Without a name the scans tell the lidar, and 'stillmap dataset sensor' "
+                       "makes a file from a recording.)"});
   }
   YamlFile yaml = open_yaml(folder / name_or_file);
   SensorModel sensor;

@@ -233,9 +233,9 @@ TEST_F(DatasetCommandTest, LabelsByTheModelWhatComesWithoutLabels) {
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return result;
   };
-  EXPECT_THAT(mapped("auto").out, HasSubstr("labels: stream, else street"));
+  EXPECT_THAT(mapped("auto").out, HasSubstr("labels: the recording's own, else street"));
   const ProcessResult without = mapped("files");
-  EXPECT_THAT(without.out, HasSubstr("labels: stream;"));
+  EXPECT_THAT(without.out, HasSubstr("labels: the recording's own;"));
   EXPECT_THAT(without.err, HasSubstr("some scans have no labels"));
 }
 

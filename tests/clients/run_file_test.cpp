@@ -21,5 +21,13 @@ TEST(RunFileRanges, OtherTextIsRefused) {
   }
 }
 
+TEST(RunFileSettings, OnlyWhatDiffersIsNamed) {
+  const auto [one, other] =
+      different_parts("sensor VLP-16, labels none, loops closed", "sensor VLP-16, labels street");
+  EXPECT_EQ(one, "labels none, loops closed");
+  EXPECT_EQ(other, "labels street");
+  EXPECT_EQ(different_parts("a, b", "a").second, "");
+}
+
 }  // namespace
 }  // namespace stillmap::cli

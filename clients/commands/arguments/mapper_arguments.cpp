@@ -54,8 +54,8 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments) {
                  "Server file (config/server/*.yaml); its mapper settings are used");
   command.option(
       "--sensor", arguments.sensor,
-      "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: that of --config, else as the data "
-      "set suggests");
+      "hdl_64e, hdl_32e, vlp_16, a sensor file, or auto (the scans tell); default: that of "
+      "--config, else auto");
   command
       .option(
           "--labels", arguments.labels,
@@ -87,6 +87,15 @@ Weighting weighting_from_name(const std::string& weighting_name) {
                               "' is not known; there are none, geometric and semantic");
 }
 
+bool MapperArguments::names_sensor() const { return !sensor.empty() && sensor != "auto"; }
+
+std::string sensor_origin(const MapperArguments& arguments) {
+  if (arguments.names_sensor()) return "option";
+  if (!arguments.sensor.empty() || arguments.config_file.empty()) return "scans";
+  return load_server_config(arguments.config_file).automatic_sensor.is_on ? "scans"
+                                                                          : "configuration";
+}
+
 namespace {
 
 /// The sensor is not that of the file, whose ranges may leave no point of it.
@@ -103,9 +112,9 @@ void use_other_sensor(const SensorModel& sensor, const std::string& config_file,
 MapperConfig mapper_config(const MapperArguments& arguments, const SensorModel& suggested_sensor) {
   ServerConfig server;
   if (!arguments.config_file.empty()) server = load_server_config(arguments.config_file);
-  if (!arguments.sensor.empty()) {
+  if (arguments.names_sensor()) {
     use_other_sensor(load_sensor(arguments.sensor), arguments.config_file, server);
-  } else if (server.automatic_sensor.is_on) {
+  } else if (server.automatic_sensor.is_on || !arguments.sensor.empty()) {
     use_other_sensor(suggested_sensor, arguments.config_file, server);
   }
   MapperConfig& config = server.mapper;

@@ -30,7 +30,7 @@ void set_engine(const EngineArguments& arguments, EngineOptions& choice);
 struct MapperArguments {
   /// Server file whose mapper and labels sections are taken; empty: the defaults.
   std::string config_file;
-  /// Name or file; empty: that of `config_file`, else as the dataset suggests.
+  /// Name or file, or "auto": as the dataset suggests; empty: that of `config_file`, else so, too.
   std::string sensor;
   /// "auto", "files", "model" (the default one), "none", or a model folder.
   std::string labels = "auto";
@@ -39,6 +39,9 @@ struct MapperArguments {
   /// Of the network's range image; 0: as configured.
   std::uint32_t columns = 0;
   EngineArguments engine;
+
+  /// Whether `sensor` is one, and not left to the dataset.
+  [[nodiscard]] bool names_sensor() const;
 };
 
 /// Adds --columns, --engine, --precision and --threads.
@@ -53,6 +56,8 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments);
 /// Throws ConfigError or std::invalid_argument.
 [[nodiscard]] MapperConfig mapper_config(const MapperArguments& arguments,
                                          const SensorModel& suggested_sensor);
+/// What says that it is this sensor: "option", "configuration" or "scans". Throws ConfigError.
+[[nodiscard]] std::string sensor_origin(const MapperArguments& arguments);
 /// For scans of a lidar that sits there on its robot; without, upright. Throws ConfigError,
 /// ModelError or std::invalid_argument.
 [[nodiscard]] std::unique_ptr<Segmenter> make_segmenter(

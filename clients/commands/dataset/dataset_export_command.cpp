@@ -82,7 +82,7 @@ void require_one_lidar(const std::string& config_file) {
 }
 
 ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopSignal& stop) {
-  if (arguments.mapper.sensor.empty()) require_one_lidar(arguments.mapper.config_file);
+  if (!arguments.mapper.names_sensor()) require_one_lidar(arguments.mapper.config_file);
   const ScanDataset dataset =
       open_recording(arguments.source, arguments.recording, arguments.mapper.config_file);
   // They are copied, whatever --labels says.
@@ -122,7 +122,8 @@ ExportSummary export_from_topic(const DatasetExportArguments& arguments, StopSig
     config = load_server_config(arguments.mapper.config_file);
   }
   const bool names_sensor =
-      !arguments.mapper.sensor.empty() || (!config.automatic_sensor.is_on && config.lidars.empty());
+      arguments.mapper.names_sensor() ||
+      (arguments.mapper.sensor.empty() && !config.automatic_sensor.is_on && config.lidars.empty());
   config.mapper = mapper_config(arguments.mapper, config.mapper.sensor);
   Client client = connect(arguments.client);
   prepare_sequence_folder(arguments.out, arguments.force);

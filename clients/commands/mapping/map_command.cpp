@@ -142,6 +142,8 @@ MapOutput write_map_output(const MapOutputFolder& out, const std::optional<Traje
   const std::filesystem::path& folder = out.unfinished();
   MapOutput output{.folder = out.path(),
                    .frame = body.frame,
+                   .sensor = config.sensor.name,
+                   .sensor_origin = {},
                    .accuracy = std::nullopt,
                    .odometry_accuracy = std::nullopt};
   write_kitti_poses(folder / pose_file_of(body.frame), result.trajectory);
@@ -370,6 +372,7 @@ ExitCode run(const MapArguments& arguments) {
   const ScanDataset dataset =
       open_recording(arguments.dataset, arguments.recording, arguments.mapper.config_file);
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
+  const std::string told_by = sensor_origin(arguments.mapper);
   const MappedBody body = body_of(arguments.mount, arguments.mapper.config_file);
   static_cast<void>(arguments.range.end(dataset));
   static_cast<void>(denied_loops(arguments, dataset));
@@ -396,8 +399,9 @@ ExitCode run(const MapArguments& arguments) {
         << "stillmap: loops are left open, since the sequence's stamps were set back and poses "
            "of before were dropped\n";
   }
-  const MapOutput output =
+  MapOutput output =
       write_map_output(out, truth, arguments.dataset, earlier.get(), result, config, body);
+  output.sensor_origin = told_by;
   const Json report = to_json(result, output);
   write_report(out.unfinished() / "report.json", report);
   out.publish(result.stopped);
@@ -439,7 +443,7 @@ void add_map_command(CommandHandle program, Action& action) {
       "map", "Map a sequence or bag in this process: the server's mapper without DDS");
   command.option("DATASET", arguments->dataset, dataset_kinds).required();
   add_recording_options(command, arguments->recording);
-  command.option("--out", arguments->out, "Folder for the results").with_default();
+  command.option("--out,--output,-o", arguments->out, "Folder for the results").with_default();
   add_mapper_options(command, arguments->mapper);
   add_mount_option(command, arguments->mount,
                    "Poses of the robot, and the map from where it stands, as a server has them");

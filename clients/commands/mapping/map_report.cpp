@@ -178,6 +178,7 @@ Json to_json(const MappingResult& result, const MapOutput& output) {
       {"p99_ms", total.quantile(0.99)},
       {"stages", stages_json(result.stages)},
       {"peak_memory_mb", peak_memory_mb()},
+      {"sensor", {{"name", output.sensor}, {"told_by", output.sensor_origin}}},
       {"label_source", result.label_source},
       {"health", health},
       {"skipped", skipped_json(result.skipped)},
@@ -210,11 +211,25 @@ std::string describe_imu(const MappingResult& result) {
          fixed(deg_per_rad * result.levelling->tilt_rad, 1) + " degrees at the start";
 }
 
+/// "stream" is the server's word for labels that come with the scans; a network may label others.
+std::string describe_labels(const std::string& source) {
+  const std::string own = "stream";
+  if (source != own && !source.starts_with(own + ",")) return source;
+  return "the recording's own" + source.substr(own.size());
+}
+
+std::string describe_sensor(const MapOutput& output) {
+  if (output.sensor_origin == "scans") return output.sensor + ", as the scans tell";
+  return output.sensor + ", as " + (output.sensor_origin == "option" ? "--sensor" : "--config") +
+         " names it";
+}
+
 std::string describe(const MappingResult& result, const MapOutput& output) {
   std::string text = describe_stages(result.stages);
   text += std::to_string(result.trajectory.size()) + " scans mapped in " +
           fixed(result.seconds, 1) + " s, " + std::to_string(result.skipped.size()) +
-          " skipped; labels: " + result.label_source + "; odometry";
+          " skipped; lidar: " + describe_sensor(output) +
+          "; labels: " + describe_labels(result.label_source) + "; odometry";
   for (const auto& [state, count] : result.health) {
     text += std::string(" ") + name(state) + " " + std::to_string(count);
   }
@@ -223,7 +238,12 @@ std::string describe(const MappingResult& result, const MapOutput& output) {
           fixed(result.view->voxel_size_m, 2) + " m in " +
           std::to_string(result.view->tiles.size()) + " tiles; peak memory " +
           fixed(peak_memory_mb(), 0) + " MB\n";
-  if (const auto recall = result.moving.recall()) {
+  const bool looks_for_moving = result.label_source != "none";
+  if (!looks_for_moving) {
+    text +=
+        "moving points: not looked for, since there are no labels; what moves leaves the map "
+        "where later scans see through it\n";
+  } else if (const auto recall = result.moving.recall()) {
     text += "moving points found: " + fixed(100.0 * *recall, 1) + " %, right ones among them " +
             fixed(100.0 * result.moving.precision().value_or(0.0), 1) + " %\n";
   }

@@ -15,6 +15,9 @@ struct MapOutput {
   std::filesystem::path folder;
   /// What the poses are of.
   std::string frame;
+  /// The lidar that the scans were taken for, and what said so (see sensor_origin()).
+  std::string sensor;
+  std::string sensor_origin;
   std::optional<TrajectoryReport> accuracy;
   /// Before loops were closed.
   std::optional<TrajectoryReport> odometry_accuracy;

@@ -254,11 +254,14 @@ void check_resumed(std::size_t next_scan, const ScanRange& range, std::size_t en
 }  // namespace
 
 std::size_t ScanRange::end(const ScanDataset& dataset) const {
-  if (first >= dataset.size() || count == 0) {
-    throw std::invalid_argument("no scan to take: the data set has " +
-                                std::to_string(dataset.size()) + ", asked for are " +
-                                std::to_string(count) + " from number " + std::to_string(first));
+  const std::size_t scans = dataset.size();
+  if (scans == 0) throw std::invalid_argument("the data set has no scan");
+  if (first >= scans) {
+    throw std::invalid_argument("the data set has " + std::to_string(scans) + " scans, 0 to " +
+                                std::to_string(scans - 1) + "; --start is " +
+                                std::to_string(first));
   }
+  if (count == 0) throw std::invalid_argument("--scans 0 asks for no scan; 1 is the least");
   return first + std::min(count, dataset.size() - first);
 }
 

@@ -1,5 +1,6 @@
 #include "clients/commands/mapping/run_file.hpp"
 
+#include <algorithm>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -17,7 +18,41 @@ std::chrono::steady_clock::time_point after(std::chrono::duration<double> period
          std::chrono::duration_cast<std::chrono::steady_clock::duration>(period);
 }
 
+constexpr const char* between_settings = ", ";
+
+std::vector<std::string> parts_of(const std::string& settings) {
+  std::vector<std::string> parts;
+  for (std::size_t begin = 0; begin <= settings.size();) {
+    const std::size_t end = std::min(settings.find(between_settings, begin), settings.size());
+    parts.push_back(settings.substr(begin, end - begin));
+    begin = end + std::string(between_settings).size();
+  }
+  return parts;
+}
+
+/// The parts of `settings` that `others` do not have.
+std::string parts_without(const std::vector<std::string>& settings,
+                          const std::vector<std::string>& others) {
+  std::string text;
+  for (const std::string& part : settings) {
+    if (std::ranges::find(others, part) != others.end()) continue;
+    text += (text.empty() ? "" : between_settings) + part;
+  }
+  return text;
+}
+
+std::string difference_in_words(const std::string& earlier, const std::string& now) {
+  if (earlier.empty()) return "without " + now;
+  return "with " + earlier + (now.empty() ? ", which is not asked for now" : ", not with " + now);
+}
+
 }  // namespace
+
+std::pair<std::string, std::string> different_parts(const std::string& one,
+                                                    const std::string& other) {
+  const std::vector<std::string> ones = parts_of(one), others = parts_of(other);
+  return {parts_without(ones, others), parts_without(others, ones)};
+}
 
 RunFile::RunFile(std::filesystem::path file, RunIdentity run, std::chrono::duration<double> period)
     : file_(std::move(file)),
@@ -38,9 +73,10 @@ std::optional<RunState> RunFile::earlier() const {
   }
   // Older versions did not say.
   if (said.contains(settings_key) && said.at(settings_key) != run_.settings) {
-    throw std::invalid_argument(file_.string() + " is of a run with " + said.at(settings_key) +
-                                ", not with " + run_.settings +
-                                ": ask for these, or begin anew with --force");
+    const auto [earlier, now] = different_parts(said.at(settings_key), run_.settings);
+    throw std::invalid_argument(file_.string() + " is of a run " +
+                                difference_in_words(earlier, now) +
+                                ": ask for the same, or begin anew with --force");
   }
   const auto scans = from_ranges(said.at(scans_key));
   const auto next = from_ranges(said.at(next_key));

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/map/storage/map_file.hpp"
@@ -50,6 +51,10 @@ class RunFile {
   std::unique_ptr<MapStore> store_;
   std::chrono::steady_clock::time_point due_;
 };
+
+/// Of two lists with commas between their parts: what only one of them has, of each.
+[[nodiscard]] std::pair<std::string, std::string> different_parts(const std::string& one,
+                                                                  const std::string& other);
 
 /// Indices as "0-57,59": ascending; as many as there are poses.
 [[nodiscard]] std::string to_ranges(const std::vector<std::size_t>& indices);
