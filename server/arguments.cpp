@@ -6,9 +6,12 @@
 #include <iostream>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <system_error>
+#include <vector>
 
+#include "config/loaders/closest_name.hpp"
 #include "config/loaders/listening_address.hpp"
 #include "config/loaders/model_file.hpp"
 #include "idl/dds/security/identity.hpp"
@@ -175,6 +178,19 @@ void add_server_options(CLI::App& program, ServerArguments& server) {
                            "latest: drop scans that are too many; every: let the sender wait");
 }
 
+/// The first option that does not exist but is written much as one that does: that one.
+std::string meant_option(const CLI::App& program, std::span<char* const> words) {
+  std::vector<std::string> known;
+  for (const CLI::Option* option : program.get_options())
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  for (const std::string word : words) {
+    const std::string name = word.substr(0, word.find('='));
+    if (!name.starts_with("--") || program.get_option_no_throw(name) != nullptr) continue;
+    if (const std::string meant = closest_name(name, known); !meant.empty()) return meant;
+  }
+  return {};
+}
+
 }  // namespace
 
 Arguments read_arguments(int argc, char** argv) {
@@ -199,7 +215,11 @@ Arguments read_arguments(int argc, char** argv) {
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return {.config = std::nullopt, .exit_code = program.exit(error) == 0 ? 0 : bad_usage};
+    if (program.exit(error) == 0) return {.config = std::nullopt, .exit_code = 0};
+    const std::string meant =
+        meant_option(program, std::span(argv, static_cast<std::size_t>(argc)));
+    if (!meant.empty()) std::cerr << "Did you mean '" << meant << "'?\n";
+    return {.config = std::nullopt, .exit_code = bad_usage};
   }
   if (!checked_file.empty()) return check_config(checked_file);
   ServerConfig config = config_file.empty() ? ServerConfig() : load_server_config(config_file);

@@ -45,6 +45,16 @@ bool wait_for(double timeout_s, std::chrono::milliseconds max_slice, Wait wait) 
   }
 }
 
+/// The text of the last of several waits, with the time of all in place of its own.
+std::string with_whole_wait(std::string fault, std::chrono::milliseconds waited) {
+  const std::string before = " within ";
+  const std::size_t begin = fault.find(before);
+  const std::size_t end = fault.find(" ms", begin);
+  if (end == std::string::npos) return fault;
+  const std::size_t number = begin + before.size();
+  return fault.replace(number, end - number, std::to_string(waited.count()));
+}
+
 std::unique_ptr<Client> connect(std::optional<std::uint32_t> domain, const std::string& server,
                                 const std::string& profile,
                                 const std::vector<std::string>& interfaces,
@@ -77,7 +87,7 @@ std::unique_ptr<Client> connect(std::optional<std::uint32_t> domain, const std::
       return false;
     }
   });
-  if (!answers) throw ServiceTimeout(fault);
+  if (!answers) throw ServiceTimeout(with_whole_wait(fault, duration_of(timeout_s)));
   return client;
 }
 

@@ -2,6 +2,7 @@
 
 PYBIND11_MODULE(_stillmap, module) {
   namespace python = stillmap::python;
+  module.attr("__version__") = STILLMAP_VERSION;
   python::bind_frames(module);
   python::bind_dataset(module);
   python::bind_traversability(module);

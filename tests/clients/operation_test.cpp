@@ -272,6 +272,12 @@ TEST_F(OperationTest, ChecksAConfigurationWithoutStarting) {
   EXPECT_THAT(content("check.log"), AllOf(HasSubstr("absent"), Not(HasSubstr("can be used"))));
 }
 
+TEST_F(OperationTest, NamesTheOptionThatWasMeant) {
+  BackgroundProcess server(stillmap_server_program() + " --deliver every", folder_ / "log");
+  EXPECT_EQ(server.wait(), 2);
+  EXPECT_THAT(content("log"), HasSubstr("Did you mean '--delivery'?"));
+}
+
 TEST_F(OperationTest, LogsByLevelAndForTheJournalWithoutASecondClock) {
   const auto log_of = [&](const std::string& environment, const std::string& options) {
     write("server.log", "");

@@ -1,3 +1,5 @@
+#include <csignal>
+
 #include "tests/clients/command_test.hpp"
 
 namespace stillmap::test {
@@ -13,6 +15,18 @@ TEST_F(SimulateCommandTest, WritesASequenceWithTruth) {
   }
   EXPECT_FALSE(exists("city/velodyne/000003.bin"));
   EXPECT_EQ(line_count("city/poses.txt"), 3U);
+}
+
+TEST_F(SimulateCommandTest, SaysThatItWasStoppedAndKeepsWhatThereIs) {
+  BackgroundProcess simulation(
+      stillmap_program() + " simulate " + path("city") + " --preset yard --scans 100000",
+      folder_ / "log");
+  ASSERT_TRUE(eventually([&] { return exists("city/velodyne/000002.bin"); }));
+  simulation.send(SIGINT);
+  EXPECT_EQ(simulation.wait(), 1);
+  EXPECT_THAT(content("log"),
+              AllOf(HasSubstr("stopped early, as asked, after "), HasSubstr(" of 100000 scans")));
+  EXPECT_GE(line_count("city/poses.txt"), 2U);
 }
 
 TEST_F(SimulateCommandTest, WritesTheSamplesOfAnImuWhenAsked) {

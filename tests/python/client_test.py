@@ -110,6 +110,8 @@ def test_removed_voxels_and_saving(client, tmp_path):
 def test_no_server_is_an_exception_that_names_the_domain(free_domain):
     with pytest.raises(stillmap.ServiceTimeout, match=str(free_domain)):
         stillmap.Client(domain=free_domain, timeout_s=0.5)
+    with pytest.raises(stillmap.ServiceTimeout, match="within 1200 ms"):
+        stillmap.Client(domain=free_domain, timeout_s=1.2)
     with pytest.raises(stillmap.ConfigError, match="pigeon"):
         stillmap.Client(domain=free_domain, profile="pigeon")
 

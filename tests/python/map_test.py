@@ -1,6 +1,8 @@
 """Map files as arrays, against what the command line says of them and against NumPy."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -22,6 +24,29 @@ def test_it_holds_what_map_info_counts(map, map_file):
     counts = np.bincount(voxels.label, minlength=len(stillmap.CLASS_NAMES))
     for name, count in zip(stillmap.CLASS_NAMES, counts):
         assert info["classes"].get(name, 0) == count, name
+
+
+def test_what_the_interpreter_shows_tells_things_apart(map, city):
+    assert repr(map) == f"<stillmap.Map: {len(map)} voxels of 0.2 m in {len(map.tiles)} tiles, version {map.version}>"
+    assert repr(map.voxels()) == f"<stillmap.Voxels: {len(map)} voxels>"
+    assert repr(map.trajectory) == f"<stillmap.Trajectory: {len(map.trajectory)} poses>"
+    dataset = stillmap.open_dataset(city)
+    assert repr(dataset) == f"<stillmap.Dataset: {len(dataset)} scans of {dataset.sensor.name}>"
+    assert repr(dataset[0]).startswith(f"<stillmap.Scan: {len(dataset[0])} points")
+    assert "16 rings" in repr(dataset.sensor)
+    mapper = stillmap.Mapper(dataset.sensor)
+    assert repr(mapper.process(dataset[0])).startswith("<stillmap.MappedScan: ")
+    assert repr(mapper) == "<stillmap.Mapper: 1 poses, labels: none>"
+
+
+def test_it_has_the_version_of_the_programs():
+    assert run("--version").split()[-1] == stillmap.__version__
+
+
+def test_without_numpy_it_names_what_is_missing():
+    program = "import sys; sys.modules['numpy'] = None; import stillmap"
+    failed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert failed.stderr.splitlines()[-1].startswith("ImportError: stillmap needs numpy (Debian's python3-numpy)")
 
 
 def test_packed_voxels_are_what_numpy_makes_of_their_bytes(map):

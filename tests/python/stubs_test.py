@@ -26,7 +26,7 @@ def test_names_are_those_of_the_module():
             named.add(node.name)
         elif isinstance(node, ast.AnnAssign):
             named.add(node.target.id)
-    assert named == public(dir(stillmap)) - ALIASES
+    assert public(named) == public(dir(stillmap)) - ALIASES
 
 
 def test_members_and_parameters_are_those_of_the_classes():

@@ -82,7 +82,11 @@ ExitCode run(const SimulateArguments& arguments) {
               << "/ (SemanticKITTI sequence; poses.txt is in the camera frame, as "
               << "KITTI's)\n";
   }
-  return written.scans == config.scans ? ExitCode::ok : ExitCode::failed;
+  if (written.scans == config.scans) return ExitCode::ok;
+  std::cerr << "stillmap: stopped early, as asked, after " << written.scans << " of "
+            << config.scans << " scans; " << arguments.out
+            << " is a sequence of these, complete in itself\n";
+  return ExitCode::failed;
 }
 
 }  // namespace

@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 Place = tuple[float, float] | tuple[float, float, float]
 Path = str | PathLike[str]
 
+__version__: str
+
 CLASS_NAMES: tuple[str, ...]
 CLASS_COLOURS: NDArray[np.uint8]
 CELL_STATES: tuple[str, ...]
