@@ -193,6 +193,7 @@ void draw_closures(cv::Mat& picture, const PictureFrame& frame, const Trajectory
 void draw_places(cv::Mat& picture, const PictureFrame& frame, const Trajectory& places) {
   constexpr double radius_px = 6.0, line_px = 18.0;
   for (const StampedPose& place : places) {
+    if (!place.T_map_lidar.matrix().allFinite()) continue;
     const cv::Point2d centre = frame.pixel(place.T_map_lidar.translation().head<2>());
     const Eigen::Vector2d ahead = place.T_map_lidar.linear().col(0).head<2>();
     const cv::Point2d tip = centre + line_px * cv::Point2d(ahead.x(), -ahead.y());

@@ -48,6 +48,8 @@ TEST_F(MapWordsTest, WithoutLabelsMovingPointsAreNotLookedFor) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, AllOf(HasSubstr("moving points: not looked for"),
                                 Not(HasSubstr("moving points found"))));
+  const auto report = nlohmann::json::parse(content("out/report.json"));
+  EXPECT_TRUE(report.at("moving_points").at("recall").is_null());
 }
 
 TEST_F(MapWordsTest, ScansThatAreNotThereAreNamedByTheirNumbers) {

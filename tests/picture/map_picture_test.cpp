@@ -62,6 +62,25 @@ TEST(MapPicture, PosesThatAreNoNumbersDoNoHarm) {
   EXPECT_FALSE(cv::imread((folder / "nan.png").string()).empty());
 }
 
+TEST(MapPicture, PlacesThatWereFoundOneByOneAreNoDrive) {
+  const ScratchFolder folder;
+  const auto view = test::street_map(5, 300).view();
+  Trajectory places = drive(3);
+  for (StampedPose& place : places) place.T_map_lidar.translation() *= 20.0;
+  const auto white = [&](const MapPictureOptions& options) {
+    write_map_picture(folder / "map.png", *view, places, options);
+    return count_pixels(cv::imread((folder / "map.png").string()), {255, 255, 255});
+  };
+  const int of_drive = white({});
+  MapPictureOptions options;
+  options.looked_for = 4;
+  const int of_places = white(options);
+  EXPECT_GT(of_places, 3 * 50) << "a disc each";
+  EXPECT_LT(of_places, of_drive) << "no line joins them";
+  places[1].T_map_lidar.translation().x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_LT(white(options), of_places);
+}
+
 TEST(MapPicture, FileThatCannotBeWrittenIsNamed) {
   const ScratchFolder folder;
   EXPECT_THAT([&] { write_map_picture(folder / "no" / "map.png", MapSnapshot{}, {}); },

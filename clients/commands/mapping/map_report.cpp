@@ -149,6 +149,22 @@ std::string describe(const SessionReport& session) {
   return text + "\n";
 }
 
+/// "stream" is the server's word for labels that come with the scans; a network may label others.
+std::string describe_labels(const std::string& source) {
+  const std::string own = "stream";
+  if (source != own && !source.starts_with(own + ",")) return source;
+  return "the recording's own" + source.substr(own.size());
+}
+
+/// Points are told to move by their class.
+bool looks_for_moving(const MappingResult& result) { return result.label_source != "none"; }
+
+std::string describe_sensor(const MapOutput& output) {
+  if (output.sensor_origin == "scans") return output.sensor + ", as the scans tell";
+  return output.sensor + ", as " + (output.sensor_origin == "option" ? "--sensor" : "--config") +
+         " names it";
+}
+
 }  // namespace
 
 Json to_json(const SessionReport& session) {
@@ -168,6 +184,7 @@ Json to_json(const MappingResult& result, const MapOutput& output) {
   Json health = Json::object();
   for (const auto& [state, count] : result.health) health.set(name(state), count);
   const StageDurations& total = result.stages.back();
+  const auto moving = looks_for_moving(result) ? result.moving : evaluation::MovingScore{};
   return {
       {"scans", result.trajectory.size()},
       {"seconds", result.seconds},
@@ -187,9 +204,9 @@ Json to_json(const MappingResult& result, const MapOutput& output) {
       {"voxel_size_m", result.view->voxel_size_m},
       {"poses_frame", output.frame + "; the map is its frame at the first pose"},
       {"moving_points",
-       {{"precision", optional_number(result.moving.precision())},
-        {"recall", optional_number(result.moving.recall())},
-        {"iou", optional_number(result.moving.iou())}}},
+       {{"precision", optional_number(moving.precision())},
+        {"recall", optional_number(moving.recall())},
+        {"iou", optional_number(moving.iou())}}},
       {"accuracy", output.accuracy ? to_json(*output.accuracy) : Json(nullptr)},
       {"closures", result.loops ? closures_json(result.loops->closures) : Json(nullptr)},
       {"loops", result.loops ? to_json(*result.loops, output.odometry_accuracy) : Json(nullptr)},
@@ -211,19 +228,6 @@ std::string describe_imu(const MappingResult& result) {
          fixed(deg_per_rad * result.levelling->tilt_rad, 1) + " degrees at the start";
 }
 
-/// "stream" is the server's word for labels that come with the scans; a network may label others.
-std::string describe_labels(const std::string& source) {
-  const std::string own = "stream";
-  if (source != own && !source.starts_with(own + ",")) return source;
-  return "the recording's own" + source.substr(own.size());
-}
-
-std::string describe_sensor(const MapOutput& output) {
-  if (output.sensor_origin == "scans") return output.sensor + ", as the scans tell";
-  return output.sensor + ", as " + (output.sensor_origin == "option" ? "--sensor" : "--config") +
-         " names it";
-}
-
 std::string describe(const MappingResult& result, const MapOutput& output) {
   std::string text = describe_stages(result.stages);
   text += std::to_string(result.trajectory.size()) + " scans mapped in " +
@@ -238,8 +242,7 @@ std::string describe(const MappingResult& result, const MapOutput& output) {
           fixed(result.view->voxel_size_m, 2) + " m in " +
           std::to_string(result.view->tiles.size()) + " tiles; peak memory " +
           fixed(peak_memory_mb(), 0) + " MB\n";
-  const bool looks_for_moving = result.label_source != "none";
-  if (!looks_for_moving) {
+  if (!looks_for_moving(result)) {
     text +=
         "moving points: not looked for, since there are no labels; what moves leaves the map "
         "where later scans see through it\n";
