@@ -14,6 +14,9 @@ enum class GroundOrigin : std::uint8_t {
   inferred,
   /// Unknown; the height only serves as reference for the heights of objects in the cell.
   assumed,
+  /// Unknown, for the cell was measured far below the ground beside it: the bottom of a pit or
+  /// ditch. The height is that of its edge.
+  pit,
 };
 
 /// The ground in a cell.
@@ -66,8 +69,11 @@ inline constexpr double max_filled_gap_m = 6.0;
 ///   - and the far end lies on the extrapolated slopes of both ends: no step in between;
 /// over more than `max_bare_gap_m`, ground in a third direction, near and of that class, must lie
 /// on the same surface. Where lines disagree about the height, the cell stays unfilled. Other cells
-/// with voxels but without ground get an `assumed` level. Cells within `border` of the grid's edge
-/// are left unchanged. @pre `seen` has no origin other than `none` and `seen`
+/// with voxels but without ground get an `assumed` level. They are a `pit` if they and two cells
+/// beside them were measured below the ground at both ends of a line through them (at its one end,
+/// where the other has none), farther than a slope falls, and nothing of theirs at its level. Cells
+/// within `border` of the grid's edge are left unchanged.
+/// @pre `seen` has no origin other than `none` and `seen`
 [[nodiscard]] GroundGrid fill_holes(const GroundGrid& seen, const ColumnGrid& columns,
                                     const GroundLevel& level, double cell_m, int border = 0);
 

@@ -29,6 +29,10 @@ constexpr int slope_cells = 5;
 constexpr float object_from_m = 0.25F;
 constexpr float object_to_m = 2.0F;
 constexpr double fall_slope = 0.3;
+/// The same where the ground on the far side was not seen, so that a bank may go on down.
+constexpr double open_fall_slope = 0.6;
+/// Cells beside the bottom of a pit that were measured as far down.
+constexpr int min_pit_neighbours = 2;
 
 struct Direction {
   int dx;
@@ -59,9 +63,22 @@ bool has_object(Column column, float ground_m) {
 }
 
 /// Whether the column was measured farther down than ground falls off so far from ground.
-bool falls_away(Column column, float ground_m, double distance_m) {
-  const double fall_m = object_from_m + fall_slope * distance_m;
+bool falls_away(Column column, float ground_m, double distance_m, double slope = fall_slope) {
+  const double fall_m = object_from_m + slope * distance_m;
   return !column.empty() && column.front().height_m < ground_m - fall_m;
+}
+
+/// Whether the column has what may be ground at a level: the rim of a pit, a plank over it, or the
+/// road above its own reflections.
+bool has_surface_at(Column column, float level_m) {
+  return std::ranges::any_of(column, [level_m](const ColumnVoxel& voxel) {
+    return (is_ground(voxel.label) || voxel.label == SemanticClass::unlabeled) &&
+           std::abs(voxel.height_m - level_m) <= object_from_m;
+  });
+}
+
+GroundCell assumed_at(float height_m) {
+  return {.height_m = height_m, .top_m = height_m, .origin = GroundOrigin::assumed};
 }
 
 /// Nearest ground in eight directions of every cell without ground.
@@ -74,8 +91,11 @@ class Holes {
 
   /// Interpolated ground of the cell, if it can be filled.
   [[nodiscard]] std::optional<GroundCell> inferred(int x, int y) const;
-  /// Height of the nearest ground in any direction.
+  /// Height of the nearest ground in any direction, whatever lies before it: what stands beside it
+  /// stands on it.
   [[nodiscard]] std::optional<float> nearest_height(int x, int y) const;
+  /// The cell as the bottom of a pit, if it is one.
+  [[nodiscard]] std::optional<GroundCell> pit_bottom(int x, int y) const;
 
  private:
   struct End {
@@ -89,21 +109,33 @@ class Holes {
   };
 
   void find_reach(std::size_t direction);
+  [[nodiscard]] Reach cells_to_ground(const CellGrid<Reach>& reach, int x, int y,
+                                      std::size_t direction) const;
   [[nodiscard]] Reach reach_from(int x, int y, std::size_t direction) const;
   [[nodiscard]] std::optional<End> end(int x, int y, std::size_t direction) const;
+  /// Nearest ground, whatever lies before it.
+  [[nodiscard]] std::optional<End> edge(int x, int y, std::size_t direction) const;
+  [[nodiscard]] End end_after(int x, int y, std::size_t direction, Reach cells) const;
+  [[nodiscard]] std::optional<float> pit_edge_m(int x, int y, std::size_t direction) const;
   [[nodiscard]] std::optional<double> slope_at(const End& end, Direction outwards) const;
   [[nodiscard]] bool is_one_surface(const End& a, const End& b, std::size_t direction) const;
   [[nodiscard]] std::optional<Line> line_through(int x, int y, std::size_t direction) const;
   /// Whether the cell was measured farther down than ground falls off so far from ground, and one
   /// beside it, too: one alone may be a reflection.
   [[nodiscard]] bool is_in_pit(int x, int y, float ground_m, double distance_m) const;
+  /// Cells beside it that were measured farther down than ground falls off with a slope.
+  [[nodiscard]] std::ptrdiff_t fallen_neighbours(int x, int y, float ground_m, double distance_m,
+                                                 double slope) const;
   [[nodiscard]] bool has_third_direction(int x, int y, std::size_t direction,
                                          const GroundCell& cell) const;
 
   const GroundGrid& seen_;
   const ColumnGrid& columns_;
   double cell_m_;
+  /// Not through objects and pits.
   std::array<CellGrid<Reach>, directions.size()> reach_;
+  /// Through anything.
+  std::array<CellGrid<Reach>, directions.size()> edge_reach_;
 };
 
 /// Computes the reach of all cells in one direction, from the far side of the grid back: each cell
@@ -111,44 +143,63 @@ class Holes {
 void Holes::find_reach(std::size_t direction) {
   const Direction d = directions.at(direction);
   reach_.at(direction) = CellGrid<Reach>(seen_.width(), seen_.height(), 0);
+  edge_reach_.at(direction) = reach_.at(direction);
   for (int row = 0; row < seen_.height(); ++row) {
     const int y = d.dy > 0 ? seen_.height() - 1 - row : row;
     for (int column = 0; column < seen_.width(); ++column) {
       const int x = d.dx > 0 ? seen_.width() - 1 - column : column;
-      if (!seen_(x, y).is_known()) reach_.at(direction)(x, y) = reach_from(x, y, direction);
+      if (seen_(x, y).is_known()) continue;
+      edge_reach_.at(direction)(x, y) = cells_to_ground(edge_reach_.at(direction), x, y, direction);
+      reach_.at(direction)(x, y) = reach_from(x, y, direction);
     }
   }
 }
 
-Reach Holes::reach_from(int x, int y, std::size_t direction) const {
+/// From the reach of the next cell; 0 if that has none or the ground is too far.
+Reach Holes::cells_to_ground(const CellGrid<Reach>& reach, int x, int y,
+                             std::size_t direction) const {
   const Direction d = directions.at(direction);
   const int next_x = x + d.dx;
   const int next_y = y + d.dy;
   if (!seen_.contains(next_x, next_y)) return 0;
   int cells = 1;
   if (!seen_(next_x, next_y).is_known()) {
-    const Reach further = reach_.at(direction)(next_x, next_y);
+    const Reach further = reach(next_x, next_y);
     if (further == 0) return 0;
     cells += further;
   }
-  const double distance_m = cells * d.length() * cell_m_;
-  if (distance_m > max_filled_gap_m) return 0;
-  const GroundCell& end = seen_(x + cells * d.dx, y + cells * d.dy);
-  if (has_object(columns_(x, y), end.height_m)) return 0;
-  if (is_in_pit(x, y, end.height_m, distance_m)) return 0;
+  return cells * d.length() * cell_m_ > max_filled_gap_m ? Reach{0} : static_cast<Reach>(cells);
+}
+
+Reach Holes::reach_from(int x, int y, std::size_t direction) const {
+  const Reach cells = cells_to_ground(reach_.at(direction), x, y, direction);
+  if (cells == 0) return 0;
+  const End end = end_after(x, y, direction, cells);
+  const float end_m = end.cell->height_m;
+  if (has_object(columns_(x, y), end_m)) return 0;
+  if (is_in_pit(x, y, end_m, end.distance_m)) return 0;
   // The wall of a pit may lie below the ground at its edge.
-  const bool is_beside_end = cells == 1;
-  if (is_beside_end && is_in_pit(next_x, next_y, end.height_m, 0.0)) return 0;
-  return static_cast<Reach>(cells);
+  if (cells == 1 && is_in_pit(end.x, end.y, end_m, 0.0)) return 0;
+  return cells;
+}
+
+Holes::End Holes::end_after(int x, int y, std::size_t direction, Reach cells) const {
+  const Direction d = directions.at(direction);
+  const int end_x = x + cells * d.dx;
+  const int end_y = y + cells * d.dy;
+  return {cells * d.length() * cell_m_, &seen_(end_x, end_y), end_x, end_y};
 }
 
 std::optional<Holes::End> Holes::end(int x, int y, std::size_t direction) const {
   const Reach cells = reach_.at(direction)(x, y);
   if (cells == 0) return std::nullopt;
-  const Direction d = directions.at(direction);
-  const int end_x = x + cells * d.dx;
-  const int end_y = y + cells * d.dy;
-  return End{cells * d.length() * cell_m_, &seen_(end_x, end_y), end_x, end_y};
+  return end_after(x, y, direction, cells);
+}
+
+std::optional<Holes::End> Holes::edge(int x, int y, std::size_t direction) const {
+  const Reach cells = edge_reach_.at(direction)(x, y);
+  if (cells == 0) return std::nullopt;
+  return end_after(x, y, direction, cells);
 }
 
 /// Rise per metre towards the hole, from the ground farther out.
@@ -220,25 +271,57 @@ std::optional<GroundCell> Holes::inferred(int x, int y) const {
 }
 
 bool Holes::is_in_pit(int x, int y, float ground_m, double distance_m) const {
-  if (!falls_away(columns_(x, y), ground_m, distance_m)) return false;
-  return std::ranges::any_of(directions, [&](const Direction& d) {
+  return falls_away(columns_(x, y), ground_m, distance_m) &&
+         fallen_neighbours(x, y, ground_m, distance_m, fall_slope) > 0;
+}
+
+std::ptrdiff_t Holes::fallen_neighbours(int x, int y, float ground_m, double distance_m,
+                                        double slope) const {
+  return std::ranges::count_if(directions, [&](const Direction& d) {
     return columns_.contains(x + d.dx, y + d.dy) &&
-           falls_away(columns_(x + d.dx, y + d.dy), ground_m, distance_m + d.length() * cell_m_);
+           falls_away(columns_(x + d.dx, y + d.dy), ground_m, distance_m + d.length() * cell_m_,
+                      slope);
   });
+}
+
+/// The lower ground at the ends of a line through the cell, if that is the bottom of a pit between
+/// them. On a slope, one end is as low as the cell.
+std::optional<float> Holes::pit_edge_m(int x, int y, std::size_t direction) const {
+  const std::optional<End> a = edge(x, y, direction);
+  const std::optional<End> b = edge(x, y, direction + line_count);
+  std::optional<float> edge_m;
+  for (const std::optional<End>& one : {a, b}) {
+    if (!one) continue;
+    const float ground_m = one->cell->height_m;
+    const double slope = a && b ? fall_slope : open_fall_slope;
+    if (!falls_away(columns_(x, y), ground_m, one->distance_m, slope)) return std::nullopt;
+    if (fallen_neighbours(x, y, ground_m, one->distance_m, slope) < min_pit_neighbours)
+      return std::nullopt;
+    if (has_surface_at(columns_(x, y), ground_m)) return std::nullopt;
+    edge_m = std::min(edge_m.value_or(ground_m), ground_m);
+  }
+  return edge_m;
+}
+
+std::optional<GroundCell> Holes::pit_bottom(int x, int y) const {
+  std::optional<GroundCell> bottom;
+  for (std::size_t i = 0; i < line_count; ++i) {
+    const std::optional<float> edge_m = pit_edge_m(x, y, i);
+    if (!edge_m || (bottom && *edge_m <= bottom->height_m)) continue;
+    bottom = assumed_at(*edge_m);
+    bottom->origin = GroundOrigin::pit;
+  }
+  return bottom;
 }
 
 std::optional<float> Holes::nearest_height(int x, int y) const {
   std::optional<End> nearest;
   for (std::size_t i = 0; i < directions.size(); ++i) {
-    const std::optional<End> one = end(x, y, i);
+    const std::optional<End> one = edge(x, y, i);
     if (one && (!nearest || one->distance_m < nearest->distance_m)) nearest = one;
   }
   if (!nearest) return std::nullopt;
   return nearest->cell->height_m;
-}
-
-GroundCell assumed_at(float height_m) {
-  return {height_m, height_m, GroundOrigin::assumed, SemanticClass::unlabeled};
 }
 
 }  // namespace
@@ -254,6 +337,8 @@ GroundGrid fill_holes(const GroundGrid& seen, const ColumnGrid& columns, const G
     }
     if (const std::optional<GroundCell> ground = holes.inferred(x, y)) {
       filled(x, y) = *ground;
+    } else if (const std::optional<GroundCell> bottom = holes.pit_bottom(x, y)) {
+      filled(x, y) = *bottom;
     } else if (!columns(x, y).empty()) {
       const float level_m =
           std::isnan(level.at(x, y)) ? columns(x, y).front().height_m : level.at(x, y);

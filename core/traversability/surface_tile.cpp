@@ -198,7 +198,11 @@ SurfaceTile make_surface(const TileNeighbourhood<ColumnTile>& columns, double ce
     for (int x = margin; x < margin + tile.side; ++x) {
       SurfaceCell cell;
       cell.ground = ground(x, y);
-      if (cell.ground.is_known()) cell.shape = shape_at(ground, x, y, cell_m);
+      if (cell.ground.is_known()) {
+        cell.shape = shape_at(ground, x, y, cell_m);
+      } else if (cell.ground.origin == GroundOrigin::pit) {
+        cell.shape.step_m = cell.ground.height_m - window(x, y).front().height_m;
+      }
       tile.cells.push_back(cell);
       tile.begin.push_back(static_cast<std::uint32_t>(tile.object_heights_m.size()));
       if (cell.ground.origin != GroundOrigin::none) add_objects(tile, cell.ground, window(x, y));

@@ -34,7 +34,7 @@ struct SurfaceShape {
 /// Ground of a cell, independent of the robot.
 struct SurfaceCell {
   GroundCell ground;
-  /// Set for known ground only.
+  /// Set for known ground only; of a pit, the step down from its edge.
   SurfaceShape shape;
 
   friend bool operator==(const SurfaceCell&, const SurfaceCell&) = default;

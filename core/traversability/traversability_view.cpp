@@ -56,8 +56,10 @@ BlockReason reason_of(const SurfaceTile::View& surface, const RobotProfile& prof
     return *object_height_m < 0.5 * profile.height_m ? BlockReason::obstacle
                                                      : BlockReason::low_headroom;
   }
-  return surface.cell->ground.is_known() ? reason_of_ground(*surface.cell, profile)
-                                         : BlockReason::none;
+  const SurfaceCell& cell = *surface.cell;
+  if (cell.ground.is_known()) return reason_of_ground(cell, profile);
+  // Of a pit nothing is known but that no robot drives over it.
+  return cell.shape.step_m > profile.max_step_m ? BlockReason::step : BlockReason::none;
 }
 
 std::uint8_t free_cost(const SurfaceCell& cell, const RobotProfile& profile) {

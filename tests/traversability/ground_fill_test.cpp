@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "core/traversability/ground_estimate.hpp"
+#include "core/traversability/path_check.hpp"
 #include "tests/traversability/voxel_world.hpp"
 
 namespace stillmap {
@@ -14,6 +17,17 @@ using test::VoxelWorld;
 
 const SurfaceCell& surface_at(const TraversabilityView& view, double x_m, double y_m) {
   return *look(view, x_m, y_m).surface;
+}
+
+/// A robot that drives over any ground, seen or not.
+RobotProfile explorer() {
+  RobotProfile robot = square_robot();
+  robot.name = "explorer";
+  for (const SemanticClass label : {road, terrain, unlabeled})
+    robot.class_cost.at(static_cast<std::size_t>(label)) = 0.0;
+  robot.max_step_m = 0.25;
+  robot.unknown = UnknownGround::allowed;
+  return robot;
 }
 
 /// A street along x from -8 to 8: road between y -4 and 2, a pavement 0.13 m higher beside it.
@@ -116,6 +130,44 @@ TEST(GroundFill, NotOverAPitOrADitchWhoseBottomWasMeasured) {
   }
 }
 
+TEST(GroundFill, NoRobotThatGoesThroughUnknownGroundCrossesADitchWhoseBottomWasMeasured) {
+  for (const SemanticClass label : {terrain, unlabeled}) {
+    for (const double depth_m : {0.8, 1.2, 2.0}) {
+      for (const double width_m : {0.6, 1.0, 2.0}) {
+        // Wherever the blocks of the ground's level begin.
+        for (const double from_m : {-1.0, -0.4, 0.0, 0.6}) {
+          VoxelWorld world;
+          world.ground(-6, -6, 8, 6, label);
+          world.ground(from_m, -6, from_m + width_m, 6, label,
+                       [depth_m](double, double) { return 0.1 - depth_m; });
+          const auto view = traversability_of(world.view(), explorer());
+          for (double y_m = -3.0; y_m < 3.1; y_m += 0.5) {
+            const std::array<PlanarPose, 2> across{{{{-3.5, y_m}, 0.0}, {{5.5, y_m}, 0.0}}};
+            EXPECT_FALSE(check_path(*view, across).is_free)
+                << name(label) << ", " << depth_m << " m deep, " << width_m << " m wide from "
+                << from_m << ", y " << y_m;
+          }
+          EXPECT_EQ(look(*view, -4.9, 0.1).cell.state, CellState::free);
+        }
+      }
+    }
+  }
+}
+
+TEST(GroundFill, ASlopeWithBushesOnItHasNoPit) {
+  VoxelWorld world;
+  const auto slope = [](double x_m, double) { return 0.4 * x_m; };
+  world.ground(-7, -7, 7, 7, terrain, slope);
+  world.clear(-1.6, -1.6, 1.6, 1.6);
+  for (double x_m = -1.5; x_m < 1.6; x_m += 0.2)
+    world.block(x_m - 0.1, -1.6, x_m + 0.1, 1.6, 0.4 * x_m, 0.4 * x_m + 0.1, vegetation);
+  RobotProfile robot = explorer();
+  robot.max_slope_deg = 30.0;
+  const auto view = traversability_of(world.view(), robot);
+  for (double x_m = -1.5; x_m < 1.6; x_m += 0.2)
+    EXPECT_NE(look(*view, x_m, 0.1).cell.reason, BlockReason::step) << x_m;
+}
+
 TEST(GroundFill, BridgesTheGapsBetweenRings) {
   VoxelWorld world;
   for (double x_m = -6; x_m < 6; x_m += 1.0) world.ground(x_m, -6, x_m + 0.2, 6, road);
@@ -161,6 +213,23 @@ TEST(GroundFill, OneReflectionBelowTheGroundIsNoPit) {
     world.block(x_m, 0.0, x_m + 0.2, 0.2, -0.9, -0.8, unlabeled);
     const auto view = traversability_of(world.view(), square_robot());
     EXPECT_EQ(surface_at(*view, 0.5, 0.1).ground.origin, GroundOrigin::inferred) << x_m;
+  }
+}
+
+TEST(GroundFill, AFewReflectionsBelowTheGroundAreNothingThatStopsARobot) {
+  // A road that was seen and mirrors what stands beside it, and two cells of which it was not seen.
+  for (const SemanticClass label : {road, unlabeled}) {
+    VoxelWorld world;
+    world.ground(-6, -6, 6, 6, label);
+    world.block(-2, -2, 0, 0, -1.3, -1.1, unlabeled);
+    world.clear(2.0, 2.0, 2.4, 2.2);
+    world.block(2.0, 2.0, 2.4, 2.2, -1.1, -0.9, unlabeled);
+    const auto view = traversability_of(world.view(), explorer());
+    for (double x_m = -3.9; x_m < 4.0; x_m += 0.2) {
+      for (double y_m = -3.9; y_m < 4.0; y_m += 0.2)
+        EXPECT_NE(look(*view, x_m, y_m).cell.state, CellState::lethal)
+            << name(label) << ", " << x_m << ", " << y_m;
+    }
   }
 }
 
