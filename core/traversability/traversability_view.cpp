@@ -161,18 +161,25 @@ std::vector<Candidate> candidates_in(const TraversabilityView& view, const Trave
   return candidates;
 }
 
+/// Whether a robot can stand at a pose.
+bool can_stand_at(const TraversabilityView& view, CellLookup& lookup, const PlanarPose& pose) {
+  const FootprintCells cells(view.profile, pose, view.cell_m);
+  for (std::int32_t y = cells.low().y; y <= cells.high().y; ++y) {
+    for (std::int32_t x = cells.low().x; x <= cells.high().x; ++x) {
+      if (!cells.has({x, y})) continue;
+      if (conflict_with(lookup.at({x, y}).cell, view.profile) != BlockReason::none) return false;
+    }
+  }
+  return true;
+}
+
 /// Whether a robot can stand there with some heading.
 bool can_stand(const TraversabilityView& view, CellLookup& lookup,
                const Eigen::Vector2d& position_map) {
   constexpr int headings = 16;
   for (int i = 0; i < headings; ++i) {
-    bool is_free = true;
-    visit_footprint(
-        view, {position_map, i * 2.0 * std::numbers::pi / headings}, [&](CellIndex index) {
-          is_free =
-              is_free && conflict_with(lookup.at(index).cell, view.profile) == BlockReason::none;
-        });
-    if (is_free) return true;
+    const double heading_rad = i * 2.0 * std::numbers::pi / headings;
+    if (can_stand_at(view, lookup, {position_map, heading_rad})) return true;
   }
   return false;
 }
@@ -324,9 +331,10 @@ NearestTraversable nearest_traversable(const TraversabilityView& view,
   std::optional<Candidate> best;
   double below_m = std::nextafter(max_distance_m, HUGE_VAL);
   for (const auto& [tile_m, tile] : tiles) {
-    if (tile_m >= below_m || tried == max_tried) break;
+    if (tile_m >= below_m || tried >= max_tried) break;
     for (const Candidate& candidate : candidates_in(view, *tile, position_map, below_m)) {
-      if (tried++ == max_tried) break;
+      if (tried >= max_tried) break;
+      ++tried;
       if (!can_stand(view, lookup, view.centre_of(candidate.cell))) continue;
       best = candidate;
       below_m = candidate.distance_m;

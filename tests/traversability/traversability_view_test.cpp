@@ -5,10 +5,12 @@
 
 #include <Eigen/Geometry>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <random>
 #include <set>
 #include <span>
+#include <utility>
 
 #include "core/traversability/path_check.hpp"
 #include "tests/traversability/voxel_world.hpp"
@@ -79,6 +81,44 @@ TEST(NearestTraversable, TheRobotCanStandThere) {
       EXPECT_GT(nearest.distance_m, 0.0);
     }
   }
+}
+
+/// Free cells, in rows with unknown ones between them up to `beyond_x` and side by side from there.
+std::shared_ptr<const TraversabilityTile> striped_tile(TileId id, int side, int beyond_x) {
+  auto tile = std::make_shared<TraversabilityTile>();
+  auto surface = std::make_shared<SurfaceTile>();
+  const auto cells = static_cast<std::size_t>(side) * static_cast<std::size_t>(side);
+  tile->id = id;
+  tile->side = surface->side = side;
+  surface->cells.resize(cells);
+  surface->begin.assign(cells + 1, 0);
+  tile->cells.resize(cells);
+  for (std::size_t i = 0; i < cells; ++i) {
+    TraversabilityCell& cell = tile->cells[i];
+    cell.clearance_m = 2.0F;
+    if (id.x >= beyond_x || i / static_cast<std::size_t>(side) % 2 == 0)
+      cell.state = CellState::free;
+  }
+  tile->surface = std::move(surface);
+  return tile;
+}
+
+TEST(NearestTraversable, TriesTwentyThousandCellsAndNoMore) {
+  // Five rows of five tiles of 4,050 free cells without room, then tiles that are free.
+  TraversabilityView view;
+  view.cell_m = 0.2;
+  view.tile_size_m = 18.0;
+  view.profile = square_robot();
+  for (int x = 0; x < 6; ++x) {
+    for (int y = 0; y < 5; ++y) view.tiles.push_back(striped_tile({x, y}, 90, 5));
+  }
+  const NearestTraversable far = nearest_traversable(view, {45.0, 45.0});
+  EXPECT_EQ(far.status, TraversabilityStatus::not_found);
+  EXPECT_THAT(far.reason, HasSubstr("20000 free cells"));
+  // From nearer, fewer lie before them.
+  const NearestTraversable near = nearest_traversable(view, {89.0, 45.0});
+  EXPECT_EQ(near.status, TraversabilityStatus::ok) << near.reason;
+  EXPECT_GT(near.position_map.x(), 90.0);
 }
 
 TEST(NearestTraversable, RespectsTheLongestWay) {
