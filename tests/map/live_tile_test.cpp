@@ -7,6 +7,7 @@
 #include <map>
 #include <random>
 #include <set>
+#include <vector>
 
 #include "core/map/storage/tile_codec.hpp"
 
@@ -190,6 +191,25 @@ TEST(LiveTile, OfAVoxelThatAFileExcludesTooTheVoxelStays) {
   const TileRecord back = reloaded.record(rule, stamps);
   EXPECT_EQ(decode_tile(encode_tile(*back.tile), live_grid).voxels.size(), 1U);
   EXPECT_TRUE(back.evidence->excluded.empty());
+}
+
+TEST(LiveTile, ABoxThatBeginsOrEndsWhereARemovedVoxelLiesRestoresIt) {
+  ScanStamps stamps;
+  for (const bool is_end : {false, true}) {
+    LiveTile tile(live_id, live_grid);
+    for (std::uint32_t seed = 1; seed < 4; ++seed) tile.insert(scan_of(seed), stamps.add(seed));
+    for (std::uint32_t miss = 0; miss < rule.label_trust; ++miss)
+      (void)tile.clear_seen_through(visibility_after(0), stamps.add(10 + miss), rule);
+    (void)tile.publish(1, rule, stamps);
+    const std::vector<RemovedVoxel> removed = tile.removed(rule, stamps);
+    EXPECT_GT(std::ranges::count(removed, RemovalReason::seen_through, &RemovedVoxel::reason), 500);
+    for (const RemovedVoxel& voxel : removed) {
+      const Eigen::Vector3d position_map = voxel.position_map.cast<double>();
+      Eigen::AlignedBox3d box_map(position_map);
+      box_map.extend(position_map + Eigen::Vector3d::Constant(is_end ? -0.001 : 0.001));
+      EXPECT_EQ(tile.restore(voxel.reason, box_map, rule), 1U) << position_map.transpose();
+    }
+  }
 }
 
 TEST(LiveTile, FindsEveryVoxel) {

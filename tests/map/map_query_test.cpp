@@ -94,6 +94,24 @@ TEST_F(MapQueryTest, AgreesWithBruteForceOnRandomBoxesAndClasses) {
   }
 }
 
+TEST_F(MapQueryTest, ABoxThatBeginsOrEndsWhereAVoxelLiesHasIt) {
+  std::size_t asked = 0;
+  for (const QueryVoxel& voxel : query_map(view(), MapQuery()).voxels) {
+    if (asked++ % 7 != 0) continue;
+    const Vector3d position_map = voxel.position_map.cast<double>();
+    for (const double reach_m : {0.05, -0.05}) {
+      AlignedBox3d box_map(position_map);
+      box_map.extend(position_map + Vector3d::Constant(reach_m));
+      MapQuery query;
+      query.region = box_region(box_map);
+      EXPECT_THAT(query_map(view(), query).voxels,
+                  testing::Contains(testing::Field(&QueryVoxel::position_map, voxel.position_map)))
+          << position_map.transpose() << ", " << reach_m;
+    }
+  }
+  EXPECT_GT(asked, 2000U);
+}
+
 TEST_F(MapQueryTest, AgreesWithBruteForceOnEveryKindOfRegion) {
   const HeightRange heights{.min_m = -1.0, .max_m = 2.0};
   for (const Region& region :

@@ -41,7 +41,7 @@ class VoxelFilter {
 
   [[nodiscard]] bool matches_all() const { return is_inside_ && matches_all_classes_; }
   [[nodiscard]] bool matches(const Eigen::Vector3f& mean_map, const ClassEvidence& evidence) const {
-    return (is_inside_ || near_.contains(mean_map.cast<double>())) &&
+    return (is_inside_ || near_.contains_mean(mean_map)) &&
            (matches_all_classes_ ||
             query_.classes.test(static_cast<std::size_t>(evidence.winner())));
   }

@@ -181,6 +181,10 @@ bool RegionShape::contains(const Eigen::Vector3d& p_map) const {
                     shape_);
 }
 
+bool RegionShape::contains_mean(const Eigen::Vector3f& mean_map) const {
+  return contains(mean_map.cast<double>());
+}
+
 bool RegionShape::may_intersect(const Eigen::AlignedBox3d& box_map) const {
   if (!bounds_map_.intersects(box_map)) return false;
   return std::visit(Cases{[](const WholeBounds&) { return true; },
