@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,10 +50,11 @@ class BagFile {
   [[nodiscard]] virtual std::vector<std::string> faults() const { return {}; }
 };
 
-/// A .db3 file.
+/// A .db3 file. Where the database is damaged, its messages are those that can be found by their
+/// numbers, from the first one on and from the last one back.
 class SqliteBagFile final : public BagFile {
  public:
-  /// Refuses what is no SQLite database with rosbag2's tables.
+  /// Refuses what is no SQLite database with rosbag2's tables, or whose topics cannot be read.
   explicit SqliteBagFile(const std::filesystem::path& file);
   ~SqliteBagFile() override;
 
@@ -61,13 +64,31 @@ class SqliteBagFile final : public BagFile {
   [[nodiscard]] std::vector<std::uint8_t> bytes(const BagMessage& message) const override;
   [[nodiscard]] std::vector<std::uint8_t> first_bytes(const BagMessage& message,
                                                       int bytes) const override;
+  [[nodiscard]] std::vector<std::string> faults() const override { return faults_; }
 
  private:
+  struct Row {
+    BagMessage message;
+    std::int64_t topic = 0;
+  };
+
+  void count_messages();
+  /// In one direction of their numbers, up to the first that cannot be read or is `end`.
+  [[nodiscard]] std::vector<Row> rows_until_damage(bool backwards, std::int64_t end) const;
+  void find_readable_rows();
+  /// messages() of a damaged file.
+  [[nodiscard]] std::vector<BagMessage> readable_messages(const std::string& topic,
+                                                          std::size_t file) const;
   [[nodiscard]] std::vector<std::uint8_t> blob(const char* query, std::int64_t row,
                                                int bytes) const;
 
   std::filesystem::path path_;
   std::unique_ptr<SQLite::Database> database_;
+  /// By the number of the topic.
+  std::map<std::int64_t, std::uint64_t> messages_of_topic_;
+  /// What can be read of a damaged file, by number; nothing for a sound one.
+  std::optional<std::vector<Row>> readable_;
+  std::vector<std::string> faults_;
 };
 
 }  // namespace stillmap::dds

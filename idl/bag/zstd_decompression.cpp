@@ -2,7 +2,8 @@
 
 #include <zstd.h>
 
-#include <cstdlib>
+#include <algorithm>
+#include <array>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -20,6 +21,11 @@ struct FreeStream {
 };
 
 }  // namespace
+
+bool is_zstd(std::span<const std::uint8_t> bytes) {
+  constexpr std::array<std::uint8_t, 4> magic{0x28, 0xB5, 0x2F, 0xFD};
+  return bytes.size() >= magic.size() && std::ranges::equal(bytes.first(magic.size()), magic);
+}
 
 std::vector<std::uint8_t> decompressed(std::span<const std::uint8_t> frame) {
   const auto size = ZSTD_getFrameContentSize(frame.data(), frame.size());
@@ -60,19 +66,6 @@ void decompress_file(const std::filesystem::path& from, const std::filesystem::p
   out.close();
   if (!out)
     throw DatasetWriteError(to, "cannot be written; is the folder for temporary files full?");
-}
-
-TemporaryFolder::TemporaryFolder() {
-  std::string name = (std::filesystem::temp_directory_path() / "stillmap-bag-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) {
-    throw DatasetError(name, "cannot be made; check the folder for temporary files (TMPDIR)");
-  }
-  path_ = name;
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
 }
 
 }  // namespace stillmap::dds

@@ -8,6 +8,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/dataset/recording.hpp"
 #include "clients/terminal/progress.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "config/loaders/sensor_file.hpp"
 #include "core/dataset/dataset_error.hpp"
@@ -88,6 +89,7 @@ void require_points(const ScanDataset& recording, const std::string& path) {
 }
 
 ExitCode run(const DatasetSensorArguments& arguments) {
+  end_cleanly_when_stopped();
   const ScanDataset recording = open_recording(arguments.dataset, arguments.topic);
   require_points(recording, arguments.dataset);
   SensorModel sensor = recording.suggested_sensor();

@@ -16,6 +16,7 @@
 #include "clients/commands/model/benchmark_scan.hpp"
 #include "clients/commands/model/model_arguments.hpp"
 #include "clients/commands/model/speed_beside_load.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/lidar/range_image.hpp"
 #include "core/lidar/scan.hpp"
@@ -253,6 +254,8 @@ ExitCode run_beside_load(const ModelSpeedArguments& arguments, const Scan& scan)
 }
 
 ExitCode run(const ModelSpeedArguments& arguments) {
+  // A packed bag is unpacked.
+  if (!arguments.dataset.empty()) end_cleanly_when_stopped();
   const Scan scan = arguments.dataset.empty()
                         ? benchmark_scan()
                         : open_recording(arguments.dataset, arguments.topic_in).read(0).scan;
