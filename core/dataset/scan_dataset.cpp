@@ -14,6 +14,7 @@
 #include "core/dataset/gnss_file.hpp"
 #include "core/dataset/imu_file.hpp"
 #include "core/dataset/kitti_files.hpp"
+#include "core/dataset/kitti_sequence_writer.hpp"
 #include "core/dataset/point_cloud_files.hpp"
 #include "core/lidar/measured_elevation.hpp"
 #include "core/lidar/point_fields.hpp"
@@ -273,6 +274,22 @@ double ScanDataset::period_s() const {
 fs::path ScanDataset::beside(std::size_t i, const char* folder, const char* extension) const {
   if (sequence_.empty()) return {};
   return sequence_ / folder / (file(i).stem().string() + extension);
+}
+
+std::vector<fs::path> ScanDataset::all_files() const {
+  std::vector<fs::path> files = files_;
+  if (source_) return files;
+  const auto add = [&files](const fs::path& file) {
+    std::error_code error;
+    if (!file.empty() && fs::is_regular_file(file, error)) files.push_back(file);
+  };
+  for (std::size_t i = 0; i < size(); ++i) {
+    add(beside(i, "labels", ".label"));
+    for (const char* folder : {"time_offsets", "rings"}) add(beside(i, folder, ".bin"));
+  }
+  for (const char* part : sequence_parts)
+    add((sequence_.empty() ? files_.front().parent_path() : sequence_) / part);
+  return files;
 }
 
 bool ScanDataset::has_labels(std::size_t i) const {

@@ -41,6 +41,10 @@ class ScanDataset {
   [[nodiscard]] std::size_t size() const { return files_.size(); }
   [[nodiscard]] const std::filesystem::path& file(std::size_t i) const { return files_.at(i); }
 
+  /// Every file that it is read from: those of the scans, what lies beside them, and the text files
+  /// of a sequence. For scans of a source: the names that it gives them.
+  [[nodiscard]] std::vector<std::filesystem::path> all_files() const;
+
   /// From times.txt, else from the file's name, else 0.1 s apart from 0.
   [[nodiscard]] std::int64_t stamp_ns(std::size_t i) const { return stamps_ns_.at(i); }
 

@@ -179,7 +179,23 @@ TEST_F(DatasetCommandTest, DoesNotWriteOverAnythingUnlessForced) {
     EXPECT_EQ(of_part.exit_code, 2) << part;
     EXPECT_THAT(of_part.err, HasSubstr("the source stays as it is")) << part;
   }
+  // What links lead to is another folder's, too.
+  std::filesystem::create_directories(folder_ / "linked/velodyne");
+  std::filesystem::create_directories(folder_ / "labelled/velodyne");
+  std::filesystem::create_directory_symlink(folder_ / "city/velodyne", folder_ / "view");
+  std::filesystem::create_symlink(folder_ / "city/velodyne/000000.bin",
+                                  folder_ / "linked/velodyne/000000.bin");
+  std::filesystem::copy_file(folder_ / "city/velodyne/000000.bin",
+                             folder_ / "labelled/velodyne/000000.bin");
+  std::filesystem::create_directory_symlink(folder_ / "city/labels", folder_ / "labelled/labels");
+  for (const char* linked : {"view", "linked", "labelled"}) {
+    const ProcessResult of_link =
+        run("dataset export " + path(linked) + " " + path("city") + " --labels none --force");
+    EXPECT_EQ(of_link.exit_code, 2) << linked;
+    EXPECT_THAT(of_link.err, HasSubstr("the source stays as it is")) << linked;
+  }
   EXPECT_TRUE(exists("city/velodyne/000001.bin"));
+  EXPECT_TRUE(exists("city/labels/000001.label"));
 
   const std::string to_cloud = "dataset aggregate " + path("city") + " " + path("city.ply");
   ASSERT_EQ(run(to_cloud).exit_code, 0);

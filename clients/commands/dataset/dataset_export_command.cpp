@@ -4,6 +4,7 @@
 #include <optional>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/arguments/mapper_arguments.hpp"
@@ -99,7 +100,9 @@ ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopS
   // What cannot be read is told before anything is replaced.
   static_cast<void>(dataset.imu());
   static_cast<void>(dataset.gnss());
-  prepare_sequence_folder(arguments.out, arguments.force, arguments.source);
+  std::vector<std::filesystem::path> sources = dataset.all_files();
+  sources.emplace_back(arguments.source);
+  prepare_sequence_folder(arguments.out, arguments.force, sources);
   Progress progress("export", "scans", total);
   ExportSummary summary = export_sequence(
       dataset, arguments.range, config, std::move(labels), arguments.out,

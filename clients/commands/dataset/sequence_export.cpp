@@ -133,18 +133,22 @@ class SequenceExporter {
   std::size_t scans_with_labels_ = 0;
 };
 
-/// Whether it is this folder or file, or beneath it.
-bool is_within(const std::filesystem::path& path, const std::filesystem::path& folder) {
-  if (path.empty()) return false;
-  const std::filesystem::path whole = std::filesystem::weakly_canonical(path);
-  const std::filesystem::path above = std::filesystem::weakly_canonical(folder);
+/// Without links, "." and "..".
+std::filesystem::path place_of(const std::filesystem::path& path) {
+  std::error_code error;
+  std::filesystem::path place = std::filesystem::weakly_canonical(path, error);
+  return error ? std::filesystem::absolute(path).lexically_normal() : place;
+}
+
+/// Whether it is this folder or file, or beneath it; both are places.
+bool is_within(const std::filesystem::path& whole, const std::filesystem::path& above) {
   return std::mismatch(above.begin(), above.end(), whole.begin(), whole.end()).first == above.end();
 }
 
 }  // namespace
 
 void prepare_sequence_folder(const std::filesystem::path& folder, bool force,
-                             const std::filesystem::path& source) {
+                             std::span<const std::filesystem::path> sources) {
   const std::filesystem::path present = part_of_sequence_in(folder);
   if (present.empty()) return;
   if (!force) {
@@ -152,12 +156,15 @@ void prepare_sequence_folder(const std::filesystem::path& folder, bool force,
         folder.string() + " holds a sequence already (" + present.string() +
         "); name another folder, or replace it and its labels with --force");
   }
-  for (const char* part : sequence_parts) {
-    if (is_within(source, folder / part)) {
-      throw std::invalid_argument(source.string() + " is a part of " + folder.string() +
-                                  ", which would be replaced: the source stays as it is; name "
-                                  "another folder");
-    }
+  std::vector<std::filesystem::path> replaced;
+  for (const char* part : sequence_parts) replaced.push_back(place_of(folder / part));
+  for (const std::filesystem::path& source : sources) {
+    const std::filesystem::path place = place_of(source);
+    if (std::ranges::none_of(replaced, [&](const auto& part) { return is_within(place, part); }))
+      continue;
+    throw std::invalid_argument(source.string() + " is a part of " + folder.string() +
+                                ", which would be replaced: the source stays as it is; name "
+                                "another folder");
   }
   for (const char* part : sequence_parts) std::filesystem::remove_all(folder / part);
 }

@@ -16,9 +16,10 @@ namespace stillmap::cli {
 
 /// Prepares the folder for a new sequence. Throws std::invalid_argument when `folder` holds a
 /// part of one already and `force` is not set; with `force`, removes the files of that sequence and
-/// nothing else, and throws as well where the `source` of the new one is among them.
+/// nothing else, and throws as well where one of the `sources` of the new one is among them,
+/// whatever links lead there.
 void prepare_sequence_folder(const std::filesystem::path& folder, bool force,
-                             const std::filesystem::path& source = {});
+                             std::span<const std::filesystem::path> sources = {});
 
 /// Counts of an export.
 struct ExportSummary {
