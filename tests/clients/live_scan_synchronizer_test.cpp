@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 #include "clients/commands/dataset/live_export.hpp"
 
 namespace stillmap::cli {
@@ -80,6 +83,48 @@ TEST(LiveScanSynchronizer, DoesNotPileUpScansForAServerThatIsGone) {
   LiveScanSynchronizer scans;
   for (std::int64_t stamp_ns = 0; stamp_ns < 1000; ++stamp_ns) scans.add_scan(scan_at(stamp_ns));
   EXPECT_EQ(scans.without_pose(), 800U);
+}
+
+/// A turn of a VLP-16 in a room, and a point where the lidar's range ends and that of others not.
+Scan turn_with_a_far_point() {
+  Scan scan;
+  for (int step = 0; step < 900; ++step) {
+    for (int ring = 0; ring < 16; ++ring) {
+      const double azimuth = step * 2.0 * std::numbers::pi / 900.0;
+      const double elevation = (-15.0 + 2.0 * ring) * std::numbers::pi / 180.0;
+      const double range = step == 7 && ring == 8 ? 110.0 : 8.0 + std::sin(azimuth);
+      scan.points_lidar.push_back(
+          (range * Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
+                                   std::cos(elevation) * std::sin(azimuth), std::sin(elevation)))
+              .cast<float>());
+      scan.ring.push_back(static_cast<std::uint16_t>(ring));
+    }
+  }
+  return scan;
+}
+
+TEST(ServersPoints, AreThoseOfTheLidarThatADefaultServerRecognises) {
+  const Scan scan = turn_with_a_far_point();
+  ServersPoints points{ServerConfig{}};
+  for (int again = 0; again < 2; ++again) {
+    const auto ranges = points.ranges_for(scan, scan.size() - 1);
+    ASSERT_TRUE(ranges);
+    EXPECT_EQ(ranges->max_range_m, vlp_16().max_range_m);
+    EXPECT_EQ(usable_points(scan, *ranges).size(), scan.size() - 1);
+  }
+  // Before the server has recognised it, and where its labels are of other points.
+  EXPECT_TRUE(points.ranges_for(scan, scan.size()));
+  EXPECT_FALSE(points.ranges_for(scan, scan.size() - 100));
+}
+
+TEST(ServersPoints, KeepTheRangesThatTheServersFileSays) {
+  const Scan scan = turn_with_a_far_point();
+  ServerConfig config;
+  config.mapper.prepare.max_range_m = 50.0;
+  config.automatic_sensor.sets_max_range = false;
+  ServersPoints points(config);
+  EXPECT_EQ(points.ranges_for(scan, scan.size() - 1).value().max_range_m, 50.0);
+  EXPECT_FALSE(points.ranges_for(scan, scan.size()));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "clients/commands/dataset/live_export.hpp"
 
+#include <algorithm>
 #include <iterator>
 #include <mutex>
 #include <optional>
@@ -62,16 +63,16 @@ class LiveInput {
 class LiveExporter {
  public:
   LiveExporter(const ServerConfig& config, const std::filesystem::path& folder)
-      : prepare_(config.mapper.prepare), output_(folder) {}
+      : servers_points_(config), output_(folder) {}
 
   void write(const LiveScan& live) {
     std::vector<std::uint32_t> raw_labels;
     if (!live.classes) {
       ++labels_lost_;
     } else if (!live.classes->empty()) {
-      const bool fits = usable_points(live.scan, prepare_).size() == live.classes->size();
-      labels_misfit_ += fits ? 0U : 1U;
-      raw_labels = labels_of_all_points(live.scan, *live.classes, prepare_);
+      const auto ranges = servers_points_.ranges_for(live.scan, live.classes->size());
+      if (ranges) raw_labels = labels_of_all_points(live.scan, *live.classes, *ranges);
+      labels_misfit_ += ranges ? 0U : 1U;
     }
     output_.add(live.scan, std::move(raw_labels), live.T_map_lidar);
   }
@@ -93,13 +94,32 @@ class LiveExporter {
   }
 
  private:
-  PrepareConfig prepare_;
+  ServersPoints servers_points_;
   SequenceOutput output_;
   std::size_t labels_lost_ = 0;
   std::size_t labels_misfit_ = 0;
 };
 
 }  // namespace
+
+ServersPoints::ServersPoints(const ServerConfig& config)
+    : config_(config), known_{config.mapper.prepare} {}
+
+std::optional<PrepareConfig> ServersPoints::ranges_for(const Scan& scan, std::size_t labels) {
+  const auto fits = [&](const PrepareConfig& ranges) {
+    return usable_points(scan, ranges).size() == labels;
+  };
+  if (std::ranges::none_of(known_, fits) && config_.automatic_sensor.is_on &&
+      recognition_.learn(scan)) {
+    MapperConfig mapper = config_.mapper;
+    use_sensor(*recognition_.sensor(), config_.automatic_sensor, mapper);
+    known_.push_back(mapper.prepare);
+  }
+  const auto fitting = std::ranges::find_if(known_, fits);
+  if (fitting == known_.end()) return std::nullopt;
+  std::rotate(known_.begin(), fitting, std::next(fitting));
+  return known_.front();
+}
 
 void LiveScanSynchronizer::add_scan(const Scan& scan) {
   waiting_.push_back(scan);

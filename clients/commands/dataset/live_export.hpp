@@ -15,7 +15,9 @@
 #include "clients/library/client.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "config/loaders/server_config.hpp"
+#include "core/lidar/prepare.hpp"
 #include "core/lidar/scan.hpp"
+#include "core/lidar/sensor_fit.hpp"
 #include "core/lidar/trajectory.hpp"
 
 namespace stillmap::cli {
@@ -57,6 +59,24 @@ class LiveScanSynchronizer {
   std::size_t without_pose_ = 0;
 };
 
+/// Tells which points of a scan the server has labelled: those that its ranges leave, which, unless
+/// its file says them, are those of the lidar that it has recognised in the scans.
+class ServersPoints {
+ public:
+  /// `config` is the server's, as far as it is known.
+  explicit ServersPoints(const ServerConfig& config);
+
+  /// The ranges of which the scan has as many usable points as there are labels; nothing where none
+  /// that the scans so far show does.
+  [[nodiscard]] std::optional<PrepareConfig> ranges_for(const Scan& scan, std::size_t labels);
+
+ private:
+  ServerConfig config_;
+  SensorRecognition recognition_;
+  /// The one that fitted last comes first.
+  std::vector<PrepareConfig> known_;
+};
+
 struct LiveExportOptions {
   /// ROS 2 name of the sensor's topic.
   std::string topic;
@@ -68,8 +88,8 @@ struct LiveExportOptions {
 
 /// Writes the input and output of a running server as a SemanticKITTI sequence: the sensor's scans,
 /// the server's poses and, as a first guess, its labels. `config` is the server's: which points it
-/// keeps, how it reads the sensor's fields. Ends with the signal, enough scans, or the idle
-/// timeout. `scan_done(scans so far)`. Throws DatasetError.
+/// keeps (see ServersPoints), how it reads the sensor's fields. Ends with the signal, enough scans,
+/// or the idle timeout. `scan_done(scans so far)`. Throws DatasetError.
 [[nodiscard]] ExportSummary export_live(Client& client, const LiveExportOptions& options,
                                         const ServerConfig& config,
                                         const std::filesystem::path& folder, StopSignal& stop,
