@@ -187,6 +187,7 @@ ScanDataset::ScanDataset(const fs::path& path, std::optional<LabelKind> label_ki
   } else {
     stamps_ns_ = stamps_from_names(files_);
   }
+  bin_layout_ = find_bin_layout();
   learn_from_sample();
 }
 
@@ -208,6 +209,13 @@ std::vector<std::size_t> ScanDataset::sample() const {
     indices.push_back(count > 1 ? k * (size() - 1) / (count - 1) : 0);
   }
   return indices;
+}
+
+BinLayout ScanDataset::find_bin_layout() const {
+  if (files_.front().extension() != ".bin") return BinLayout::kitti;
+  std::vector<fs::path> files;
+  for (const std::size_t i : sample()) files.push_back(file(i));
+  return bin_layout_of(files);
 }
 
 void ScanDataset::learn_from_sample() {
@@ -250,7 +258,7 @@ std::optional<KittiLidar> ScanDataset::find_kitti_lidar() const {
   std::vector<Scan> scans;
   for (const std::size_t i : sample()) {
     try {
-      scans.push_back(read_kitti_bin(file(i)));
+      scans.push_back(read_bin(file(i), bin_layout_));
     } catch (const DatasetError&) {
       // Whoever reads that scan is told.
       continue;
@@ -319,7 +327,7 @@ DatasetFrame ScanDataset::read_as_recorded(std::size_t i) const {
     return {std::move(scan), std::move(raw_labels)};
   }
   DatasetFrame frame;
-  frame.scan = read_kitti_bin(file(i));
+  frame.scan = read_bin(file(i), bin_layout_);
   frame.scan.stamp_ns = stamp_ns(i);
   const std::size_t points = frame.scan.size();
   if (const auto labels = beside(i, "labels", ".label"); fs::exists(labels)) {

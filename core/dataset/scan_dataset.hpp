@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/dataset/bin_layout.hpp"
 #include "core/dataset/kitti_lidar.hpp"
 #include "core/dataset/scan_source.hpp"
 #include "core/lidar/label_kind.hpp"
@@ -20,7 +21,8 @@ namespace stillmap {
 /// - a SemanticKITTI sequence: velodyne/*.bin, and where present labels/*.label, times.txt,
 ///   calib.txt and poses.txt (camera frame) or poses_lidar.txt (lidar frame), and our own
 ///   time_offsets/ and rings/ (see KittiSequenceWriter);
-/// - a folder of .bin, .pcd or .ply files, in the order of the stamps in their names, else in
+/// - a folder of .bin (KITTI's or nuScenes': see BinLayout), .pcd or .ply files, in the order of
+/// the stamps in their names, else in
 ///   natural order ("2" before "10");
 /// - a single such file;
 /// - any ScanSource, such as a bag's topic.
@@ -29,7 +31,7 @@ namespace stillmap {
 class ScanDataset {
  public:
   /// Throws DatasetError when there is no scan to be found, or none of some from all over it can be
-  /// read.
+  /// read, or .bin files are of a layout that is not known.
   /// `label_kind`: what the numbers in its labels are; nothing: SemanticKITTI's, and label_census()
   /// tells whether they look like them.
   explicit ScanDataset(const std::filesystem::path& path, std::optional<LabelKind> label_kind = {});
@@ -93,6 +95,8 @@ class ScanDataset {
 
   /// A few scans from all over the dataset.
   [[nodiscard]] std::vector<std::size_t> sample() const;
+  /// Of .bin files; throws DatasetError (see bin_layout_of()).
+  [[nodiscard]] BinLayout find_bin_layout() const;
   /// Takes scale, sensor and whether there are labels from them.
   void learn_from_sample();
   [[nodiscard]] std::optional<KittiLidar> find_kitti_lidar() const;
@@ -112,6 +116,7 @@ class ScanDataset {
   float intensity_scale_ = 1.0F;
   bool has_labels_ = false;
   bool lacks_labels_ = false;
+  BinLayout bin_layout_ = BinLayout::kitti;
   SensorModel suggested_sensor_;
   std::optional<KittiLidar> kitti_lidar_;
 };

@@ -1,0 +1,252 @@
+#include "core/dataset/bin_layout.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/dataset/binary_file.hpp"
+#include "core/dataset/kitti_files.hpp"
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// So much of each file is looked at: some ten thousand points.
+constexpr std::size_t max_bytes = std::size_t{1} << 18U;
+constexpr std::size_t kitti_values = 4;
+constexpr std::size_t nuscenes_values = 5;
+constexpr std::size_t kitti_bytes = kitti_values * sizeof(float);
+constexpr std::size_t nuscenes_bytes = nuscenes_values * sizeof(float);
+/// Fewer values that repeat, or do not, are chance.
+constexpr std::size_t min_pairs = 1000;
+/// Another layout must fit so much better than KITTI's.
+constexpr double clearly_better = 0.6;
+/// A share of numbers that are no metres is noise where it is above this, and none below that.
+constexpr double much_noise = 0.05;
+constexpr double no_noise = 0.01;
+
+/// The beginning of a file.
+struct Beginning {
+  std::vector<char> bytes;
+  std::uintmax_t file_bytes = 0;
+
+  template <class T>
+  [[nodiscard]] T value(std::size_t offset) const {
+    T value{};
+    std::memcpy(&value, bytes.data() + offset, sizeof value);
+    return value;
+  }
+};
+
+std::vector<Beginning> beginnings_of(std::span<const fs::path> files) {
+  std::vector<Beginning> beginnings;
+  for (const fs::path& file : files) {
+    std::error_code error;
+    const std::uintmax_t size = fs::file_size(file, error);
+    if (error || size == 0) continue;
+    Beginning one{.bytes = std::vector<char>(std::min<std::uintmax_t>(size, max_bytes)),
+                  .file_bytes = size};
+    std::ifstream in(file, std::ios::binary);
+    if (in.read(one.bytes.data(), static_cast<std::streamsize>(one.bytes.size())))
+      beginnings.push_back(std::move(one));
+  }
+  return beginnings;
+}
+
+/// Whether files of points of so many bytes have these sizes; one in a few may be cut off.
+bool fits_sizes(const std::vector<Beginning>& files, std::size_t point_bytes) {
+  const auto fitting = std::ranges::count_if(
+      files, [=](const Beginning& file) { return file.file_bytes % point_bytes == 0; });
+  return 2 * static_cast<std::size_t>(fitting) > files.size();
+}
+
+/// Neither zero nor of the size of a coordinate in metres, as other numbers are when they are read
+/// as floating point.
+bool is_noise(double value) {
+  const double size = std::abs(value);
+  return std::isfinite(value) && size > 0.0 && (size < 1e-6 || size > 1e5);
+}
+
+/// Share of noise among `values` numbers at the beginning of every `point_bytes`.
+template <class T>
+double noise(const std::vector<Beginning>& files, std::size_t point_bytes, std::size_t values) {
+  std::size_t seen = 0, bad = 0;
+  for (const Beginning& file : files) {
+    for (std::size_t at = 0; at + point_bytes <= file.bytes.size(); at += point_bytes) {
+      for (std::size_t k = 0; k < values; ++k) {
+        const auto value = static_cast<double>(file.value<T>(at + k * sizeof(T)));
+        bad += is_noise(value) || (sizeof(T) > 4 && !std::isfinite(value)) ? 1U : 0U;
+        ++seen;
+      }
+    }
+  }
+  return seen == 0 ? 1.0 : static_cast<double>(bad) / static_cast<double>(seen);
+}
+
+/// Near differences count, far ones do not count for more than they are.
+double scaled(float value) { return std::clamp(std::asinh(double{value}), -13.0, 13.0); }
+
+/// Mean difference of the float32 values that lie so many values apart; nothing of too few. The
+/// values of a column are alike in any order of the points: a step that mixes columns can never
+/// have the smaller difference. Zeros stand for missing points and say nothing.
+std::optional<double> difference(const std::vector<Beginning>& files, std::size_t step) {
+  double sum = 0.0;
+  std::size_t pairs = 0;
+  for (const Beginning& file : files) {
+    const std::size_t values = file.bytes.size() / sizeof(float);
+    for (std::size_t i = 0; i + step < values; ++i) {
+      const auto a = file.value<float>(i * sizeof(float));
+      const auto b = file.value<float>((i + step) * sizeof(float));
+      if (a == 0.0F || b == 0.0F || !std::isfinite(a) || !std::isfinite(b)) continue;
+      sum += std::abs(scaled(a) - scaled(b));
+      ++pairs;
+    }
+  }
+  if (pairs < min_pairs) return std::nullopt;
+  return sum / static_cast<double>(pairs);
+}
+
+/// The same from a point to the next, or to the one after it, where two beams take turns.
+std::optional<double> difference_of_points(const std::vector<Beginning>& files,
+                                           std::size_t values) {
+  const auto next = difference(files, values), second = difference(files, 2 * values);
+  if (!next || !second) return std::nullopt;
+  return std::min(*next, *second);
+}
+
+/// Whether every fifth value is a ring's number.
+bool has_rings(const std::vector<Beginning>& files) {
+  constexpr float max_ring = 127.0F;
+  for (const Beginning& file : files) {
+    if (file.file_bytes % nuscenes_bytes != 0) continue;
+    for (std::size_t at = 0; at + nuscenes_bytes <= file.bytes.size(); at += nuscenes_bytes) {
+      const auto ring = file.value<float>(at + kitti_bytes);
+      if (!(ring >= 0.0F && ring <= max_ring && ring == std::floor(ring))) return false;
+    }
+  }
+  return true;
+}
+
+bool is_nuscenes(std::span<const fs::path> names, const std::vector<Beginning>& files,
+                 const std::optional<double>& as_kitti) {
+  if (!fits_sizes(files, nuscenes_bytes) || !has_rings(files)) return false;
+  const bool is_named = std::ranges::all_of(
+      names, [](const fs::path& name) { return name.string().ends_with(".pcd.bin"); });
+  const auto as_nuscenes = difference_of_points(files, nuscenes_values);
+  if (!as_kitti || !as_nuscenes) return is_named;
+  return *as_nuscenes < (is_named ? 1.0 : clearly_better) * *as_kitti;
+}
+
+/// How points are laid out that are not as KITTI's, and numpy's words that make them so.
+struct OtherLayout {
+  std::string in_words;
+  std::string conversion;
+};
+
+OtherLayout of_floats(std::size_t values) {
+  const std::string count = std::to_string(values);
+  if (values == 3) {
+    // Without intensity: 0.
+    return {"x y z as float32 without intensity",
+            "np.pad(np.fromfile('IN.bin', 'f4').reshape(-1, 3), ((0, 0), (0, 1)))"};
+  }
+  return {count + " values of float32 a point",
+          "np.fromfile('IN.bin', 'f4').reshape(-1, " + count + ")[:, :4]"};
+}
+
+/// Whether what repeats after six values are two points of three: their columns are alike.
+bool are_two_of_three(const std::vector<Beginning>& files) {
+  constexpr std::size_t values = 6;
+  if (!fits_sizes(files, values * sizeof(float))) return true;
+  std::array<double, values> sums{};
+  for (const Beginning& file : files) {
+    for (std::size_t i = 0; (i + 1) * sizeof(float) <= file.bytes.size(); ++i) {
+      const auto value = file.value<float>(i * sizeof(float));
+      if (std::isfinite(value)) sums[i % values] += std::abs(scaled(value));
+    }
+  }
+  constexpr double alike = 1.25;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto [less, more] = std::minmax(sums[k], sums[k + 3]);
+    if (more > alike * less) return false;
+  }
+  return true;
+}
+
+/// Where most numbers repeat after another number of float32 values than KITTI's.
+std::optional<OtherLayout> other_floats(const std::vector<Beginning>& files, double as_kitti) {
+  std::optional<std::size_t> best;
+  double least = clearly_better * as_kitti;
+  for (const std::size_t values : {3U, 5U, 6U, 7U}) {
+    if (!fits_sizes(files, values * sizeof(float))) continue;
+    // Twice six is three of KITTI's points.
+    const auto found =
+        values == 6 ? difference(files, values) : difference_of_points(files, values);
+    if (!found || *found >= least) continue;
+    least = *found;
+    best = values;
+  }
+  if (!best) return std::nullopt;
+  if (*best == 3 && !are_two_of_three(files)) best = 6;
+  return of_floats(*best);
+}
+
+/// Where what would be float32 is noise and, read otherwise, is not.
+std::optional<OtherLayout> other_numbers(const std::vector<Beginning>& files) {
+  if (noise<float>(files, sizeof(float), 1) < much_noise) return std::nullopt;
+  if (fits_sizes(files, 4 * sizeof(double)) && noise<double>(files, sizeof(double), 1) < no_noise) {
+    return OtherLayout{"x y z intensity as float64", "np.fromfile('IN.bin', 'f8').astype('f4')"};
+  }
+  constexpr std::size_t least = 13, most = 64;
+  for (std::size_t bytes = least; bytes <= most; ++bytes) {
+    if (!fits_sizes(files, bytes) || noise<float>(files, bytes, 3) >= no_noise) continue;
+    // KITTI's but for the intensity.
+    if (bytes == kitti_bytes) return std::nullopt;
+    const std::string count = std::to_string(bytes);
+    return OtherLayout{
+        count + " bytes a point, of which the first are x y z as float32",
+        "np.fromfile('IN.bin', 'u1').reshape(-1, " + count + ")[:, :16].copy().view('f4')"};
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+BinLayout bin_layout_of(std::span<const fs::path> files) {
+  const std::vector<Beginning> beginnings = beginnings_of(files);
+  if (beginnings.empty()) return BinLayout::kitti;
+  const auto as_kitti = difference_of_points(beginnings, kitti_values);
+  if (is_nuscenes(files, beginnings, as_kitti)) return BinLayout::nuscenes;
+  std::optional<OtherLayout> other = other_numbers(beginnings);
+  if (!other && as_kitti) other = other_floats(beginnings, *as_kitti);
+  if (!other) return BinLayout::kitti;
+  throw DatasetError(files.front(),
+                     "looks like " + other->in_words +
+                         ", not like KITTI's x y z intensity as float32, and would be read as "
+                         "noise; python3 -c \"import numpy as np; a = " +
+                         other->conversion +
+                         "; a.tofile('OUT.bin')\" converts a file whose fourth value is the "
+                         "intensity; .pcd and .ply name their values");
+}
+
+Scan read_bin(const fs::path& file, BinLayout layout) {
+  if (layout == BinLayout::kitti) return read_kitti_bin(file);
+  const auto values = read_values<float>(file, nuscenes_values);
+  Scan scan;
+  for (std::size_t i = 0; i < values.size(); i += nuscenes_values) {
+    scan.points_lidar.emplace_back(values[i], values[i + 1], values[i + 2]);
+    scan.intensity.push_back(values[i + 3]);
+    const float ring = values[i + 4];
+    const bool is_number = ring >= 0.0F && ring <= 65535.0F;
+    scan.ring.push_back(is_number ? static_cast<std::uint16_t>(ring) : std::uint16_t{0});
+  }
+  return scan;
+}
+
+}  // namespace stillmap
