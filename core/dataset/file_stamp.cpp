@@ -35,6 +35,22 @@ std::optional<std::int64_t> from_floating_point(std::string_view text) {
   return std::llround(seconds * static_cast<double>(ns_per_s));
 }
 
+/// "1583836591_182590976": seconds and nanoseconds since 1970.
+std::optional<std::int64_t> two_numbers(std::string_view text) {
+  constexpr std::size_t digits_of_nanoseconds = 9;
+  const std::size_t whole = digits_in_front(text);
+  if (whole != max_digits_of_seconds || whole + 1 >= text.size() || text[whole] != '_') {
+    return std::nullopt;
+  }
+  const std::string_view fraction = text.substr(whole + 1);
+  // Others than nine: nobody knows whether zeros are missing in front or behind.
+  const bool is_whole = digits_in_front(fraction) == fraction.size();
+  if (!is_whole || fraction.size() != digits_of_nanoseconds) return std::nullopt;
+  const std::int64_t seconds = value_of(text.substr(0, whole));
+  if (static_cast<double>(seconds) >= max_seconds) return std::nullopt;
+  return seconds * ns_per_s + value_of(fraction);
+}
+
 }  // namespace
 
 std::optional<std::int64_t> ns_from_seconds(std::string_view text) {
@@ -56,22 +72,44 @@ std::optional<std::int64_t> ns_from_seconds(std::string_view text) {
   return negative ? -ns : ns;
 }
 
-std::optional<std::int64_t> stamp_ns_from_name(std::string_view stem) {
-  const std::size_t whole = digits_in_front(stem);
+namespace {
+
+/// Of a name that is nothing but a stamp.
+std::optional<std::int64_t> stamp_ns_of(std::string_view text) {
+  const std::size_t whole = digits_in_front(text);
   if (whole == 0) return std::nullopt;
-  if (whole < stem.size()) {
-    const bool decimals_follow = stem[whole] == '.' && whole + 1 < stem.size() &&
-                                 digits_in_front(stem.substr(whole + 1)) == stem.size() - whole - 1;
-    return decimals_follow ? ns_from_seconds(stem) : std::nullopt;
+  if (whole < text.size()) {
+    const bool decimals_follow = text[whole] == '.' && whole + 1 < text.size() &&
+                                 digits_in_front(text.substr(whole + 1)) == text.size() - whole - 1;
+    if (text[whole] == '_') return two_numbers(text);
+    return decimals_follow ? ns_from_seconds(text) : std::nullopt;
   }
   // What comes later does not fit into 64 bits.
   constexpr std::string_view latest = "9200000000000000000";
-  if (stem >= latest.substr(0, whole)) return std::nullopt;
-  if (whole == 16) return value_of(stem) * 1000;
+  if (text >= latest.substr(0, whole)) return std::nullopt;
+  if (whole == 13 && text.front() != '0') return value_of(text) * 1'000'000;
+  if (whole == 16) return value_of(text) * 1000;
   if (whole == 19) {
-    return value_of(stem.substr(0, 10)) * ns_per_s + value_of(stem.substr(10));
+    return value_of(text.substr(0, 10)) * ns_per_s + value_of(text.substr(10));
   }
   return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<std::int64_t> stamp_ns_from_name(std::string_view stem) {
+  if (stem.ends_with(".pcd")) stem.remove_suffix(4);
+  if (const auto stamp_ns = stamp_ns_of(stem)) return stamp_ns;
+  // Behind the words of the name: seconds and nanoseconds have a "_" of their own.
+  const std::size_t last = stem.rfind('_');
+  if (last == std::string_view::npos || last == 0) return std::nullopt;
+  const std::size_t second = stem.rfind('_', last - 1);
+  if (second != std::string_view::npos) {
+    if (const auto stamp_ns = two_numbers(stem.substr(second + 1))) return stamp_ns;
+  }
+  // A number of words is their own, but one that can only be a time.
+  const std::string_view number = stem.substr(last + 1);
+  return digits_in_front(number) == number.size() ? stamp_ns_of(number) : std::nullopt;
 }
 
 bool natural_less(std::string_view a, std::string_view b) {

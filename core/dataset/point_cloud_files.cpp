@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstring>
 #include <fstream>
 #include <limits>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "core/dataset/cloud_content.hpp"
 #include "core/dataset/dataset_error.hpp"
@@ -36,17 +39,38 @@ Column read_column(const CloudContent& cloud, const CloudField& field, std::uint
   return column;
 }
 
-/// The field with the first of these names that the cloud has.
+/// "Scalar_Intensity" is "intensity": editors rename what they save.
+std::string plain_name(std::string name) {
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
+  constexpr std::string_view prefix = "scalar_";
+  return name.starts_with(prefix) ? name.substr(prefix.size()) : name;
+}
+
+/// The field with the first of these names that the cloud has, as it is or else renamed.
 std::optional<Column> find_column(const CloudContent& cloud,
                                   const std::vector<std::string>& names) {
   for (const std::string& name : names) {
-    std::uint64_t offset = 0;
-    for (const CloudField& field : cloud.fields) {
-      if (field.name == name) return read_column(cloud, field, offset);
-      offset += field.bytes * field.count;
+    for (const bool renamed : {false, true}) {
+      std::uint64_t offset = 0;
+      for (const CloudField& field : cloud.fields) {
+        const bool is_it =
+            renamed ? plain_name(field.name) == plain_name(name) : field.name == name;
+        if (is_it) return read_column(cloud, field, offset);
+        offset += field.bytes * field.count;
+      }
     }
   }
   return std::nullopt;
+}
+
+/// "intensity from scalar_Intensity (float32)", or what goes without it.
+std::string source_of(const std::string& what, const std::optional<Column>& column,
+                      const std::string& remark = {}) {
+  if (!column) return "no " + what;
+  const CloudField& field = column->field;
+  const std::string kind = field.kind == 'F' ? "float" : (field.kind == 'I' ? "int" : "uint");
+  return what + " from " + field.name.substr(0, 40) + " (" + kind +
+         std::to_string(8 * field.bytes) + (remark.empty() ? "" : ": " + remark) + ")";
 }
 
 std::vector<Eigen::Vector3f> points_of(const std::filesystem::path& file, const CloudContent& cloud,
@@ -67,8 +91,7 @@ std::vector<Eigen::Vector3f> points_of(const std::filesystem::path& file, const 
   return points;
 }
 
-std::vector<float> intensity_of(const CloudContent& cloud, const PointFieldNames& names) {
-  const auto intensity = find_column(cloud, names.intensity);
+std::vector<float> intensity_of(const std::optional<Column>& intensity) {
   if (!intensity) return {};
   std::vector<float> values;
   values.reserve(intensity->values.size());
@@ -76,13 +99,11 @@ std::vector<float> intensity_of(const CloudContent& cloud, const PointFieldNames
   return values;
 }
 
-std::vector<float> time_offsets_of(const CloudContent& cloud, const PointFieldNames& names,
-                                   std::int64_t stamp_ns) {
-  const auto time = find_column(cloud, names.time);
+PointTimes times_of(const std::optional<Column>& time, std::int64_t stamp_ns) {
   if (!time) return {};
   const TimeType floating = time->field.bytes == 4 ? TimeType::float32 : TimeType::float64;
   const TimeType type = time->field.kind == 'F' ? floating : TimeType::integer;
-  return point_times(time->values, type, stamp_ns).offsets_s;
+  return point_times(time->values, type, stamp_ns);
 }
 
 /// A column of whole numbers that all fit into T, else empty.
@@ -154,17 +175,24 @@ void write_cloud(const std::filesystem::path& file, const std::string& header,
 
 }  // namespace
 
-CloudFile read_point_cloud(const std::filesystem::path& file, std::int64_t stamp_ns) {
-  const PointFieldNames names;
+CloudFile read_point_cloud(const std::filesystem::path& file, std::int64_t stamp_ns,
+                           const PointFieldNames& names) {
   const CloudContent cloud =
       file.extension() == ".ply" ? read_ply_content(file) : read_pcd_content(file);
+  const auto intensity = find_column(cloud, names.intensity);
+  const auto time = find_column(cloud, names.time);
+  const auto ring = find_column(cloud, names.ring);
+  PointTimes times = times_of(time, stamp_ns);
   CloudFile read;
   read.scan.stamp_ns = stamp_ns;
   read.scan.points_lidar = points_of(file, cloud, names);
-  read.scan.intensity = intensity_of(cloud, names);
-  read.scan.time_offset_s = time_offsets_of(cloud, names, stamp_ns);
-  read.scan.ring = whole_numbers<std::uint16_t>(find_column(cloud, names.ring));
+  read.scan.intensity = intensity_of(intensity);
+  read.scan.time_offset_s = std::move(times.offsets_s);
+  read.scan.ring = whole_numbers<std::uint16_t>(ring);
   read.raw_labels = labels_of(cloud, names);
+  const bool is_no_ring = ring && read.scan.ring.empty() && !ring->values.empty();
+  read.format = source_of("intensity", intensity) + ", " + source_of("time", time, times.remark) +
+                ", " + source_of("ring", ring, is_no_ring ? "ignored: not whole numbers" : "");
   return read;
 }
 

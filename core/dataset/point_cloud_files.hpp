@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "core/lidar/point_fields.hpp"
 #include "core/lidar/scan.hpp"
 #include "core/lidar/semantic_class.hpp"
 
@@ -15,14 +17,18 @@ namespace stillmap {
 struct CloudFile {
   Scan scan;
   std::vector<std::uint32_t> raw_labels;
+  /// As DatasetFrame::format.
+  std::string format;
 };
 
 /// Reads a PCD (ascii, binary, compressed) or PLY (ascii, binary) file by the names of its fields
-/// (see PointFieldNames): x y z (required), intensity, ring, time (in any unit: see point_times())
+/// (see PointFieldNames; "scalar_Intensity", as CloudCompare writes it, is "intensity"): x y z
+/// (required), intensity, ring, time (in any unit: see point_times())
 /// and label (original SemanticKITTI id, instance in the high bits). Other fields and padding are
 /// skipped. Intensity stays as the file has it (0..255 from many). `stamp_ns` becomes the scan's
 /// stamp. Throws DatasetError for anything that is not such a file.
-[[nodiscard]] CloudFile read_point_cloud(const std::filesystem::path& file, std::int64_t stamp_ns);
+[[nodiscard]] CloudFile read_point_cloud(const std::filesystem::path& file, std::int64_t stamp_ns,
+                                         const PointFieldNames& names = {});
 
 /// One point of a map to be written.
 struct ColouredPoint {

@@ -127,16 +127,20 @@ std::vector<std::size_t> lines_in(const fs::path& file, const std::vector<std::s
   return in_order;
 }
 
-std::vector<std::int64_t> stamps_from_names(const std::vector<fs::path>& files) {
+/// Nothing where one of the names carries none.
+std::optional<std::vector<std::int64_t>> stamps_from_names(const std::vector<fs::path>& files) {
   std::vector<std::int64_t> stamps_ns;
   for (const fs::path& file : files) {
     const auto stamp_ns = stamp_ns_from_name(file.stem().string());
-    if (!stamp_ns) break;
+    if (!stamp_ns) return std::nullopt;
     stamps_ns.push_back(*stamp_ns);
   }
-  if (stamps_ns.size() == files.size()) return stamps_ns;
-  stamps_ns.clear();
-  for (std::size_t i = 0; i < files.size(); ++i) {
+  return stamps_ns;
+}
+
+std::vector<std::int64_t> made_up_stamps(std::size_t scans) {
+  std::vector<std::int64_t> stamps_ns;
+  for (std::size_t i = 0; i < scans; ++i) {
     stamps_ns.push_back(static_cast<std::int64_t>(i) * default_period_ns);
   }
   return stamps_ns;
@@ -173,8 +177,12 @@ SensorModel guess_sensor(const Scan& scan, bool kitti_file) {
 
 }  // namespace
 
-ScanDataset::ScanDataset(const fs::path& path, std::optional<LabelKind> label_kind)
-    : files_(scans_of(path)), lines_(lines_of(files_)), label_kind_(label_kind) {
+ScanDataset::ScanDataset(const fs::path& path, std::optional<LabelKind> label_kind,
+                         PointFieldNames fields)
+    : files_(scans_of(path)),
+      lines_(lines_of(files_)),
+      label_kind_(label_kind),
+      fields_(std::move(fields)) {
   if (files_.front().parent_path().filename() == "velodyne") {
     sequence_ = files_.front().parent_path().parent_path();
   }
@@ -185,7 +193,9 @@ ScanDataset::ScanDataset(const fs::path& path, std::optional<LabelKind> label_ki
       stamps_ns_.push_back(times_ns[line]);
     }
   } else {
-    stamps_ns_ = stamps_from_names(files_);
+    auto stamps_ns = stamps_from_names(files_);
+    has_made_up_stamps_ = !stamps_ns;
+    stamps_ns_ = stamps_ns ? *std::move(stamps_ns) : made_up_stamps(files_.size());
   }
   bin_layout_ = find_bin_layout();
   learn_from_sample();
@@ -239,7 +249,9 @@ void ScanDataset::learn_from_sample() {
   }
   if (readable.empty()) throw DatasetError(*fault);
   std::ranges::sort(readable);
-  const Scan typical = read_unscaled(readable[readable.size() / 2].second).scan;
+  DatasetFrame typical_frame = read_unscaled(readable[readable.size() / 2].second);
+  const Scan& typical = typical_frame.scan;
+  format_ = std::move(typical_frame.format);
   // The brightest but one of many: dark scans say too little, broken ones too much.
   std::ranges::sort(full_scales);
   intensity_scale_ = 1.0F / full_scales[full_scales.size() - (full_scales.size() > 2 ? 2 : 1)];
@@ -284,6 +296,17 @@ fs::path ScanDataset::beside(std::size_t i, const char* folder, const char* exte
   return sequence_ / folder / (file(i).stem().string() + extension);
 }
 
+std::vector<std::string> ScanDataset::remarks() const {
+  std::vector<std::string> remarks;
+  if (!format_.empty()) remarks.push_back("points have " + format_);
+  if (has_made_up_stamps_ && size() > 1) {
+    remarks.push_back("the names of the files tell no time (" + files_.front().filename().string() +
+                      "): ten scans a second are assumed, and samples of an IMU or a receiver "
+                      "beside them do not fit to that");
+  }
+  return remarks;
+}
+
 std::vector<fs::path> ScanDataset::all_files() const {
   std::vector<fs::path> files = files_;
   if (source_) return files;
@@ -323,8 +346,8 @@ DatasetFrame ScanDataset::read_unscaled(std::size_t i) const {
 DatasetFrame ScanDataset::read_as_recorded(std::size_t i) const {
   if (source_) return source_->read(i);
   if (file(i).extension() != ".bin") {
-    auto [scan, raw_labels] = read_point_cloud(file(i), stamp_ns(i));
-    return {std::move(scan), std::move(raw_labels)};
+    auto [scan, raw_labels, format] = read_point_cloud(file(i), stamp_ns(i), fields_);
+    return {std::move(scan), std::move(raw_labels), std::move(format)};
   }
   DatasetFrame frame;
   frame.scan = read_bin(file(i), bin_layout_);

@@ -5,12 +5,14 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/dataset/bin_layout.hpp"
 #include "core/dataset/kitti_lidar.hpp"
 #include "core/dataset/scan_source.hpp"
 #include "core/lidar/label_kind.hpp"
+#include "core/lidar/point_fields.hpp"
 #include "core/lidar/scan.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/lidar/trajectory.hpp"
@@ -32,9 +34,11 @@ class ScanDataset {
  public:
   /// Throws DatasetError when there is no scan to be found, or none of some from all over it can be
   /// read, or .bin files are of a layout that is not known.
+  /// `fields`: the names of what .pcd and .ply files have of a point.
   /// `label_kind`: what the numbers in its labels are; nothing: SemanticKITTI's, and label_census()
   /// tells whether they look like them.
-  explicit ScanDataset(const std::filesystem::path& path, std::optional<LabelKind> label_kind = {});
+  explicit ScanDataset(const std::filesystem::path& path, std::optional<LabelKind> label_kind = {},
+                       PointFieldNames fields = {});
 
   /// Throws DatasetError when there is no scan, or none of some from all over it can be read.
   explicit ScanDataset(std::shared_ptr<const ScanSource> source,
@@ -43,11 +47,17 @@ class ScanDataset {
   [[nodiscard]] std::size_t size() const { return files_.size(); }
   [[nodiscard]] const std::filesystem::path& file(std::size_t i) const { return files_.at(i); }
 
+  /// What was understood or taken for granted, in words: from which fields of a typical scan its
+  /// intensity, times and rings are; that files without a stamp in their names follow each other
+  /// by 0.1 s. Empty where the format leaves nothing open.
+  [[nodiscard]] std::vector<std::string> remarks() const;
+
   /// Every file that it is read from: those of the scans, what lies beside them, and the text files
   /// of a sequence. For scans of a source: the names that it gives them.
   [[nodiscard]] std::vector<std::filesystem::path> all_files() const;
 
-  /// From times.txt, else from the file's name, else 0.1 s apart from 0.
+  /// From times.txt, else from the files' names (see stamp_ns_from_name()), else 0.1 s apart from
+  /// 0.
   [[nodiscard]] std::int64_t stamp_ns(std::size_t i) const { return stamps_ns_.at(i); }
 
   /// Whether scans come with labels: any of some from all over the dataset that can be read. Labels
@@ -112,6 +122,10 @@ class ScanDataset {
   std::vector<std::size_t> lines_;
   std::vector<std::int64_t> stamps_ns_;
   std::optional<LabelKind> label_kind_;
+  PointFieldNames fields_;
+  /// Of a typical scan.
+  std::string format_;
+  bool has_made_up_stamps_ = false;
   LabelCensus label_census_;
   float intensity_scale_ = 1.0F;
   bool has_labels_ = false;

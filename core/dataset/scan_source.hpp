@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/geodesy/gnss_fix.hpp"
@@ -20,6 +21,9 @@ struct DatasetFrame {
   /// Original SemanticKITTI labels: moving ids in the low, instances in the high 16 bits. Truth for
   /// evaluation only. Empty without labels. From a ScanSource: as the source has them.
   std::vector<std::uint32_t> raw_labels;
+  /// How the fields of its points were understood, for people: "intensity from i (uint8), no time,
+  /// no ring". Empty where the format itself says it.
+  std::string format;
 };
 
 /// Scans that do not come from files of one scan each, such as those of a bag. Read by one

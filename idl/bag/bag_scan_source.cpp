@@ -60,12 +60,14 @@ BagTopic named_topic(const fs::path& path, const std::vector<BagTopic>& topics,
 
 }  // namespace
 
-BagScanSource::BagScanSource(const fs::path& path, const std::string& topic, LabelKind label_kind)
+BagScanSource::BagScanSource(const fs::path& path, const std::string& topic, LabelKind label_kind,
+                             PointFieldNames fields)
     : bag_(path),
       topic_(topic.empty() ? only_topic(path, bag_.topics())
                            : named_topic(path, bag_.topics(), topic)),
       kind_(*scan_message_type(topic_.type)),
       label_kind_(label_kind),
+      fields_(std::move(fields)),
       messages_(bag_.messages(topic_.name)) {
   if (topic_.serialization_format != "cdr") {
     throw DatasetError(path, "topic " + topic_.name + " is serialized as '" +
@@ -113,7 +115,7 @@ fs::path BagScanSource::name(std::size_t i) const {
 
 DecodedScan BagScanSource::read_message(std::size_t i) const {
   try {
-    return decode_scan(kind_, bag_.bytes(messages_.at(i)), label_kind_);
+    return decode_scan(kind_, bag_.bytes(messages_.at(i)), label_kind_, fields_);
   } catch (const CdrError& fault) {
     throw DatasetError(name(i), "message " + std::to_string(messages_[i].row) + " of " +
                                     topic_.name + " (" + topic_.type +
@@ -181,16 +183,16 @@ std::vector<GnssFix> BagScanSource::gnss() const {
 }
 
 Recording open_recording(const fs::path& path, const std::string& topic,
-                         std::optional<LabelKind> label_kind) {
+                         std::optional<LabelKind> label_kind, const PointFieldNames& fields) {
   if (is_bag(path)) {
     const auto bag = std::make_shared<const BagScanSource>(
-        path, topic, label_kind.value_or(LabelKind::semantic_kitti));
+        path, topic, label_kind.value_or(LabelKind::semantic_kitti), fields);
     return {ScanDataset(bag, label_kind), bag->faults()};
   }
   if (!topic.empty()) {
     throw DatasetError(path, "is no bag, and only bags have topics: leave --topic-in out");
   }
-  return {ScanDataset(path, label_kind), {}};
+  return {ScanDataset(path, label_kind, fields), {}};
 }
 
 ScanDataset open_sequence(const fs::path& path, const std::string& topic) {

@@ -20,7 +20,7 @@ class BagScanSource final : public ScanSource {
   /// `topic` may be empty when the bag has only one topic of scans, and go without its slash.
   /// Throws DatasetError, which lists the topics.
   BagScanSource(const std::filesystem::path& path, const std::string& topic,
-                LabelKind label_kind = LabelKind::semantic_kitti);
+                LabelKind label_kind = LabelKind::semantic_kitti, PointFieldNames fields = {});
 
   [[nodiscard]] const BagTopic& topic() const { return topic_; }
   [[nodiscard]] std::size_t size() const override { return messages_.size(); }
@@ -50,6 +50,7 @@ class BagScanSource final : public ScanSource {
   BagTopic topic_;
   ScanMessageType kind_;
   LabelKind label_kind_;
+  PointFieldNames fields_;
   std::vector<BagMessage> messages_;
   std::vector<std::int64_t> stamps_ns_;
   std::optional<SensorModel> sensor_;
@@ -62,10 +63,12 @@ struct Recording {
 };
 
 /// A recording of whatever kind: a bag, or what ScanDataset reads. `topic` is for bags alone.
-/// `label_kind`: see ScanDataset. Throws DatasetError.
+/// `label_kind`: see ScanDataset. `fields`: the names of what clouds and files have of a point.
+/// Throws DatasetError.
 [[nodiscard]] Recording open_recording(const std::filesystem::path& path,
                                        const std::string& topic = {},
-                                       std::optional<LabelKind> label_kind = {});
+                                       std::optional<LabelKind> label_kind = {},
+                                       const PointFieldNames& fields = {});
 /// The same without its faults.
 [[nodiscard]] ScanDataset open_sequence(const std::filesystem::path& path,
                                         const std::string& topic = {});

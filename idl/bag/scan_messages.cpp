@@ -55,14 +55,16 @@ sensor_msgs::msg::PointCloud2 read_cloud(CdrReader cdr) {
   return cloud;
 }
 
-DecodedScan from_cloud(CdrReader cdr, LabelKind label_kind) {
+DecodedScan from_cloud(CdrReader cdr, LabelKind label_kind, const PointFieldNames& fields) {
   const sensor_msgs::msg::PointCloud2 cloud = read_cloud(cdr);
   wire::ScanFromCloud read =
-      wire::to_scan(cloud, {.fields = {},
+      wire::to_scan(cloud, {.fields = fields,
                             .labels_are_classes = label_kind == LabelKind::classes,
                             .keeps_raw_labels = true});
   if (!read.scan) throw CdrError(read.fault.reason);
-  return {.frame = {.scan = *std::move(read.scan), .raw_labels = std::move(read.raw_labels)},
+  return {.frame = {.scan = *std::move(read.scan),
+                    .raw_labels = std::move(read.raw_labels),
+                    .format = std::move(read.format)},
           .sensor = {}};
 }
 
@@ -80,7 +82,7 @@ DecodedScan from_velodyne_packets(CdrReader cdr) {
                        ? "its " + std::to_string(packets.size()) + " packets hold no point"
                        : decoding.fault);
   }
-  return {.frame = {.scan = std::move(decoding.scan), .raw_labels = {}},
+  return {.frame = {.scan = std::move(decoding.scan), .raw_labels = {}, .format = {}},
           .sensor = std::move(decoding.sensor)};
 }
 
@@ -118,11 +120,11 @@ std::optional<ScanMessageType> scan_message_type(std::string_view type) {
 }
 
 DecodedScan decode_scan(ScanMessageType kind, std::span<const std::uint8_t> message,
-                        LabelKind label_kind) {
+                        LabelKind label_kind, const PointFieldNames& fields) {
   const CdrReader cdr(message);
   switch (kind) {
     case ScanMessageType::point_cloud:
-      return from_cloud(cdr, label_kind);
+      return from_cloud(cdr, label_kind, fields);
     case ScanMessageType::velodyne_packets:
       return from_velodyne_packets(cdr);
     case ScanMessageType::livox_points:

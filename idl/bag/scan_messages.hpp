@@ -9,6 +9,7 @@
 #include "core/geodesy/gnss_fix.hpp"
 #include "core/inertial/imu_sample.hpp"
 #include "core/lidar/label_kind.hpp"
+#include "core/lidar/point_fields.hpp"
 #include "core/lidar/sensor_model.hpp"
 
 namespace stillmap::dds {
@@ -35,9 +36,10 @@ struct DecodedScan {
 
 /// Makes a scan of a serialized message. Throws CdrError in words for bytes that are not such a
 /// message, or give no scan. Raw labels are as the message has them, in a field of 8 bits only
-/// where they are told to be classes.
+/// where they are told to be classes. `fields`: the names of what a PointCloud2 has of a point.
 [[nodiscard]] DecodedScan decode_scan(ScanMessageType kind, std::span<const std::uint8_t> message,
-                                      LabelKind label_kind = LabelKind::semantic_kitti);
+                                      LabelKind label_kind = LabelKind::semantic_kitti,
+                                      const PointFieldNames& fields = {});
 
 inline constexpr std::string_view imu_message_type = "sensor_msgs/msg/Imu";
 

@@ -39,8 +39,19 @@ TEST(StampFromName, KnowsSecondsMicrosecondsAndNanoseconds) {
   EXPECT_EQ(stamp_ns_from_name("1673400472138016"), 1673400472138016000);
 }
 
+TEST(StampFromName, KnowsThoseOfOtherDataSets) {
+  EXPECT_EQ(stamp_ns_from_name("1539765924815"), 1539765924815000000) << "milliseconds";
+  EXPECT_EQ(stamp_ns_from_name("1583836591_182590976"), 1583836591182590976);
+  EXPECT_EQ(stamp_ns_from_name("cloud_1583836591_082590976"), 1583836591082590976);
+  EXPECT_EQ(stamp_ns_from_name("n015-2018-07-24-11-22-45+0800__LIDAR_TOP__1532402927647951.pcd"),
+            1532402927647951000);
+  EXPECT_EQ(stamp_ns_from_name("lidar_1673400472138016708"), 1673400472138016708);
+}
+
 TEST(StampFromName, IsNoneForNumbersAndWords) {
-  for (const char* stem : {"9351592834600300", "", "000012", "scan", "scan_1.5", "1.5b", "1.", ".5",
+  for (const char* stem : {"scan_000012", "0000000000012", "scan_0000000012", "12_34", "_", "a_",
+                           "cloud_1583836591_8259", "1583836591_", "9583836591_182590976",
+                           "9351592834600300", "", "000012", "scan", "scan_1.5", "1.5b", "1.", ".5",
                            "9999999999999999999", "12345678901234567890"}) {
     EXPECT_EQ(stamp_ns_from_name(stem), std::nullopt) << stem;
   }

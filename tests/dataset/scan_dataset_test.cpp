@@ -445,5 +445,34 @@ TEST(ScanDataset, TakesNoPointAtInfinityForOneOfTheFieldOfView) {
   EXPECT_EQ(ScanDataset(folder.path()).suggested_sensor().name, "VLP-16");
 }
 
+TEST(ScanDataset, SaysFromWhichFieldsAScanIsAndThatItMadeUpStamps) {
+  const ScratchFolder folder;
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+      "property float z\nproperty float scalar_Intensity\nproperty float scalar_ring\n"
+      "property double scalar_Time\nproperty uchar brightness\nend_header\n"
+      "1 2 3 0.5 3 0.01 255\n4 5 6 0.25 7 0.02 0\n";
+  (void)folder.file("a.ply", ply);
+  (void)folder.file("b.ply", ply);
+  const ScanDataset dataset(folder.path());
+  const Scan scan = dataset.read(0).scan;
+  EXPECT_THAT(scan.intensity, ElementsAre(0.5F, 0.25F));
+  EXPECT_THAT(scan.ring, ElementsAre(3, 7));
+  EXPECT_EQ(scan.time_offset_s.size(), 2U);
+  EXPECT_THAT(dataset.remarks(),
+              ElementsAre(AllOf(HasSubstr("intensity from scalar_Intensity (float32)"),
+                                HasSubstr("time from scalar_Time (float64"),
+                                HasSubstr("ring from scalar_ring (float32)")),
+                          AllOf(HasSubstr("a.ply"), HasSubstr("ten scans a second"))));
+  PointFieldNames named;
+  named.intensity = {"brightness"};
+  named.time = {"absent"};
+  const ScanDataset other(folder / "a.ply", {}, named);
+  EXPECT_THAT(other.read(0).scan.intensity, ElementsAre(1.0F, 0.0F));
+  EXPECT_TRUE(other.read(0).scan.time_offset_s.empty());
+  EXPECT_THAT(other.remarks(),
+              ElementsAre(HasSubstr("intensity from brightness (uint8), no time")));
+}
+
 }  // namespace
 }  // namespace stillmap

@@ -448,5 +448,20 @@ TEST(BagScanSource, NamesTheImusAndReceiversOfWhichItUsesNone) {
                                               HasSubstr("/front/imu"), HasSubstr("/rear/imu")));
 }
 
+TEST(BagScanSource, SaysFromWhichFieldsAScanIsAndTakesThoseThatItIsTold) {
+  const ScratchFolder folder;
+  write_bag(folder / "bag", {bag_message(0), bag_message(1)});
+  EXPECT_THAT(open_recording(folder / "bag").dataset.remarks(),
+              testing::ElementsAre(AllOf(HasSubstr("intensity from intensity"),
+                                         HasSubstr("time from"), HasSubstr("ring from ring"))));
+  PointFieldNames fields;
+  fields.intensity = {"ring"};
+  fields.time = {"absent"};
+  const ScanDataset dataset = open_recording(folder / "bag", "", {}, fields).dataset;
+  EXPECT_THAT(dataset.remarks(),
+              testing::ElementsAre(AllOf(HasSubstr("intensity from ring"), HasSubstr("no time"))));
+  EXPECT_TRUE(dataset.read(0).scan.time_offset_s.empty());
+}
+
 }  // namespace
 }  // namespace stillmap::dds

@@ -11,20 +11,20 @@ namespace stillmap::cli {
 namespace {
 
 ScanDataset opened(const std::string& path, const std::string& topic,
-                   std::optional<LabelKind> label_kind) {
-  dds::Recording recording = dds::open_recording(path, topic, label_kind);
-  for (const std::string& fault : recording.faults) std::cerr << "stillmap: " << fault << "\n";
+                   std::optional<LabelKind> label_kind, const PointFieldNames& fields = {}) {
+  dds::Recording recording = dds::open_recording(path, topic, label_kind, fields);
+  for (const auto& sentences : {recording.faults, recording.dataset.remarks()})
+    for (const std::string& sentence : sentences) std::cerr << "stillmap: " << sentence << "\n";
   return std::move(recording.dataset);
 }
 
 /// Nothing where nobody says classes: SemanticKITTI's are the default of the configuration.
 std::optional<LabelKind> label_kind_of(const RecordingArguments& recording,
-                                       const std::string& config_file) {
+                                       const InputConfig& configured) {
   if (recording.label_kind == "classes") return LabelKind::classes;
   if (!recording.label_kind.empty()) return LabelKind::semantic_kitti;
-  if (config_file.empty()) return std::nullopt;
-  const LabelKind configured = load_server_config(config_file).input.label_kind;
-  return configured == LabelKind::classes ? std::optional(configured) : std::nullopt;
+  const bool are_classes = configured.label_kind == LabelKind::classes;
+  return are_classes ? std::optional(LabelKind::classes) : std::nullopt;
 }
 
 /// What is wrong with the labels, and the ways out; else empty.
@@ -56,7 +56,10 @@ ScanDataset open_recording(const std::string& path, const std::string& topic) {
 
 ScanDataset open_recording(const std::string& path, const RecordingArguments& recording,
                            const std::string& config_file) {
-  ScanDataset dataset = opened(path, recording.topic_in, label_kind_of(recording, config_file));
+  InputConfig input;
+  if (!config_file.empty()) input = load_server_config(config_file).input;
+  ScanDataset dataset =
+      opened(path, recording.topic_in, label_kind_of(recording, input), input.fields);
   const LabelCensus& census = dataset.label_census();
   if (census.unknown() > 0 && census.doubt().empty()) {
     std::cerr << "stillmap: " << census.unknown() << " of " << census.labels()

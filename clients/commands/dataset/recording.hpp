@@ -19,13 +19,14 @@ struct RecordingArguments {
 /// Adds --topic-in and --label-kind.
 void add_recording_options(CommandHandle command, RecordingArguments& recording);
 
-/// A dataset or bag, as dds::open_sequence(); says on standard error what of it cannot be read.
+/// A dataset or bag, as dds::open_sequence(); says on standard error what of it cannot be read, and
+/// how it was understood (ScanDataset::remarks()).
 /// Throws DatasetError.
 [[nodiscard]] ScanDataset open_recording(const std::string& path, const std::string& topic);
 
 /// The same, with labels of the kind that the command line says, else of `input.label_kind` in
-/// `config_file`, where there is one; says how many labels are of no known id. Throws ConfigError,
-/// too.
+/// `config_file`, where there is one, and fields by the names of `input.fields` there; says how
+/// many labels are of no known id. Throws ConfigError, too.
 [[nodiscard]] ScanDataset open_recording(const std::string& path,
                                          const RecordingArguments& recording,
                                          const std::string& config_file = {});
