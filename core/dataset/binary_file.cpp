@@ -1,8 +1,18 @@
 #include "core/dataset/binary_file.hpp"
 
+#include <algorithm>
+#include <cctype>
 #include <system_error>
 
 namespace stillmap {
+
+std::string ending_of(const std::filesystem::path& file) {
+  std::string ending = file.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char letter) {
+    return static_cast<char>(std::tolower(letter));
+  });
+  return ending;
+}
 
 std::uintmax_t scan_file_size(const std::filesystem::path& file) {
   std::error_code error;

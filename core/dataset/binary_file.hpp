@@ -18,6 +18,9 @@ static_assert(std::endian::native == std::endian::little, "KITTI's files are lit
 /// More bytes than any scan's file has; a larger one is not a scan.
 inline constexpr std::uintmax_t max_scan_file_bytes = std::uintmax_t{1} << 30;
 
+/// The ending of a file's name in small letters: ".pcd".
+[[nodiscard]] std::string ending_of(const std::filesystem::path& file);
+
 /// Size of a regular file; throws DatasetError when there is none or it is absurdly large.
 [[nodiscard]] std::uintmax_t scan_file_size(const std::filesystem::path& file);
 

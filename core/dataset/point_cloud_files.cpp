@@ -11,6 +11,7 @@
 #include <string_view>
 #include <utility>
 
+#include "core/dataset/binary_file.hpp"
 #include "core/dataset/cloud_content.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "core/lidar/label_kind.hpp"
@@ -178,7 +179,7 @@ void write_cloud(const std::filesystem::path& file, const std::string& header,
 CloudFile read_point_cloud(const std::filesystem::path& file, std::int64_t stamp_ns,
                            const PointFieldNames& names) {
   const CloudContent cloud =
-      file.extension() == ".ply" ? read_ply_content(file) : read_pcd_content(file);
+      ending_of(file) == ".ply" ? read_ply_content(file) : read_pcd_content(file);
   const auto intensity = find_column(cloud, names.intensity);
   const auto time = find_column(cloud, names.time);
   const auto ring = find_column(cloud, names.ring);

@@ -28,9 +28,11 @@ namespace fs = std::filesystem;
 
 constexpr std::int64_t default_period_ns = 100'000'000;
 
-bool is_scan_file(const fs::path& file, std::string_view extension) {
+constexpr std::array scan_endings{".bin", ".pcd", ".ply"};
+
+bool is_scan_file(const fs::path& file, std::string_view ending) {
   std::error_code error;
-  return file.extension() == extension && fs::is_regular_file(file, error);
+  return ending_of(file) == ending && fs::is_regular_file(file, error);
 }
 
 /// By the stamps that names carry ("12.5" after "12.25"); where one carries none, in natural order.
@@ -54,24 +56,26 @@ std::vector<fs::path> sorted(std::vector<fs::path> files) {
   return ordered;
 }
 
-/// The files of one kind, in order: of the first kind that the folder has.
+/// The files of one kind, in order: of the kind that the folder has most of, as calibrations and
+/// maps may lie beside scans.
 std::vector<fs::path> scans_in(const fs::path& folder) {
-  for (const std::string_view extension : {".bin", ".pcd", ".ply"}) {
+  std::vector<fs::path> most;
+  for (const std::string_view ending : scan_endings) {
     std::vector<fs::path> files;
     for (const auto& entry : fs::directory_iterator(folder)) {
-      if (is_scan_file(entry.path(), extension)) files.push_back(entry.path());
+      if (is_scan_file(entry.path(), ending)) files.push_back(entry.path());
     }
-    if (!files.empty()) return sorted(std::move(files));
+    if (files.size() > most.size()) most = std::move(files);
   }
-  return {};
+  return sorted(std::move(most));
 }
 
 std::vector<fs::path> scans_of(const fs::path& path) {
   std::error_code error;
   if (!fs::exists(path, error)) throw DatasetError(path, "no such file or folder; check the path");
   if (!fs::is_directory(path, error)) {
-    const bool known =
-        is_scan_file(path, ".bin") || is_scan_file(path, ".pcd") || is_scan_file(path, ".ply");
+    const bool known = std::ranges::any_of(
+        scan_endings, [&](const char* ending) { return is_scan_file(path, ending); });
     if (known) return {path};
     throw DatasetError(path,
                        "is no dataset; give a .bin, .pcd or .ply file, a folder "
@@ -222,7 +226,7 @@ std::vector<std::size_t> ScanDataset::sample() const {
 }
 
 BinLayout ScanDataset::find_bin_layout() const {
-  if (files_.front().extension() != ".bin") return BinLayout::kitti;
+  if (ending_of(files_.front()) != ".bin") return BinLayout::kitti;
   std::vector<fs::path> files;
   for (const std::size_t i : sample()) files.push_back(file(i));
   return bin_layout_of(files);
@@ -258,7 +262,7 @@ void ScanDataset::learn_from_sample() {
   const auto known = source_ ? source_->sensor() : std::nullopt;
   // KITTI's own scans tell neither times nor rings.
   const bool is_as_kittis =
-      files_.front().extension() == ".bin" && typical.time_offset_s.empty() && typical.ring.empty();
+      ending_of(files_.front()) == ".bin" && typical.time_offset_s.empty() && typical.ring.empty();
   suggested_sensor_ = known ? *known : guess_sensor(typical, is_as_kittis);
   if (typical.time_offset_s.empty() && typical.ring.empty() &&
       suggested_sensor_.name == hdl_64e().name)
@@ -266,7 +270,7 @@ void ScanDataset::learn_from_sample() {
 }
 
 std::optional<KittiLidar> ScanDataset::find_kitti_lidar() const {
-  if (source_ || files_.front().extension() != ".bin") return std::nullopt;
+  if (source_ || ending_of(files_.front()) != ".bin") return std::nullopt;
   std::vector<Scan> scans;
   for (const std::size_t i : sample()) {
     try {
@@ -324,12 +328,12 @@ std::vector<fs::path> ScanDataset::all_files() const {
 }
 
 bool ScanDataset::has_labels(std::size_t i) const {
-  return file(i).extension() == ".bin" ? fs::exists(beside(i, "labels", ".label"))
-                                       : !read(i).raw_labels.empty();
+  return ending_of(file(i)) == ".bin" ? fs::exists(beside(i, "labels", ".label"))
+                                      : !read(i).raw_labels.empty();
 }
 
 bool ScanDataset::lacks_labels() const {
-  if (lacks_labels_ || sequence_.empty() || file(0).extension() != ".bin") return lacks_labels_;
+  if (lacks_labels_ || sequence_.empty() || ending_of(file(0)) != ".bin") return lacks_labels_;
   for (std::size_t i = 0; i < size(); ++i)
     if (!has_labels(i)) return true;
   return false;
@@ -345,7 +349,7 @@ DatasetFrame ScanDataset::read_unscaled(std::size_t i) const {
 
 DatasetFrame ScanDataset::read_as_recorded(std::size_t i) const {
   if (source_) return source_->read(i);
-  if (file(i).extension() != ".bin") {
+  if (ending_of(file(i)) != ".bin") {
     auto [scan, raw_labels, format] = read_point_cloud(file(i), stamp_ns(i), fields_);
     return {std::move(scan), std::move(raw_labels), std::move(format)};
   }

@@ -23,9 +23,9 @@ namespace stillmap {
 /// - a SemanticKITTI sequence: velodyne/*.bin, and where present labels/*.label, times.txt,
 ///   calib.txt and poses.txt (camera frame) or poses_lidar.txt (lidar frame), and our own
 ///   time_offsets/ and rings/ (see KittiSequenceWriter);
-/// - a folder of .bin (KITTI's or nuScenes': see BinLayout), .pcd or .ply files, in the order of
-/// the stamps in their names, else in
-///   natural order ("2" before "10");
+/// - a folder of .bin (KITTI's or nuScenes': see BinLayout), .pcd or .ply files, of the kind that
+///   it has most of, in the order of the stamps in their names, else in natural order ("2" before
+///   "10");
 /// - a single such file;
 /// - any ScanSource, such as a bag's topic.
 /// Intensity is scaled to 0..1, by one factor for all that some of them decide. Files of KITTI's

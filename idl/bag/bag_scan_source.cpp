@@ -12,8 +12,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Encapsulation, sec, nanosec.
-constexpr int header_bytes = 12;
+/// Encapsulation, sec, nanosec, and a frame's name of usual length.
+constexpr int header_bytes = 128;
 
 std::string listed(const std::vector<BagTopic>& topics) {
   std::string text;
@@ -81,7 +81,9 @@ BagScanSource::BagScanSource(const fs::path& path, const std::string& topic, Lab
   for (std::size_t i = 0; i < messages_.size(); ++i) {
     std::optional<std::int64_t> stamp_ns;
     try {
-      stamp_ns = header_stamp_ns(bag_.first_bytes(messages_[i], header_bytes));
+      const auto header = bag_.first_bytes(messages_[i], header_bytes);
+      stamp_ns = header_stamp_ns(header);
+      if (const auto frame = header_frame(header)) ++frames_[*frame];
     } catch (const CdrError&) {
       // Read again, and reported then, when its turn comes.
     } catch (const DatasetError&) {
@@ -145,6 +147,15 @@ std::vector<BagMessage> BagScanSource::only_messages_of(std::string_view type) c
 
 std::vector<std::string> BagScanSource::faults() const {
   std::vector<std::string> faults = bag_.faults();
+  if (frames_.size() > 1) {
+    std::string frames;
+    for (const auto& [frame, scans] : frames_) {
+      frames += (frames.empty() ? "'" : ", '") + frame + "' (" + std::to_string(scans) + ")";
+    }
+    faults.push_back("the scans of topic " + topic_.name + " are of several frames: " + frames +
+                     "; they are taken for one lidar's. Scans of several lidars must lie on a "
+                     "topic each");
+  }
   for (const std::string_view type : {imu_message_type, gnss_message_type}) {
     const std::vector<BagTopic> topics = topics_of(type);
     if (topics.size() < 2) continue;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -33,8 +34,8 @@ class BagScanSource final : public ScanSource {
   [[nodiscard]] std::vector<ImuSample> imu() const override;
   /// Likewise of sensor_msgs/msg/NavSatFix.
   [[nodiscard]] std::vector<GnssFix> gnss() const override;
-  /// What of the bag's files cannot be read at all, and which topics are not used as there are
-  /// several of an IMU or a receiver, in words.
+  /// What of the bag's files cannot be read at all, which topics are not used as there are several
+  /// of an IMU or a receiver, and whether the scans are of several lidars, in words.
   [[nodiscard]] std::vector<std::string> faults() const;
 
  private:
@@ -53,6 +54,8 @@ class BagScanSource final : public ScanSource {
   PointFieldNames fields_;
   std::vector<BagMessage> messages_;
   std::vector<std::int64_t> stamps_ns_;
+  /// Numbers of scans by the frame in their headers.
+  std::map<std::string, std::size_t> frames_;
   std::optional<SensorModel> sensor_;
 };
 

@@ -179,4 +179,14 @@ std::optional<std::int64_t> header_stamp_ns(std::span<const std::uint8_t> messag
   }
 }
 
+std::optional<std::string> header_frame(std::span<const std::uint8_t> message) {
+  try {
+    CdrReader cdr(message);
+    (void)read_stamp_ns(cdr);
+    return std::string(cdr.text());
+  } catch (const CdrError&) {
+    return std::nullopt;
+  }
+}
+
 }  // namespace stillmap::dds

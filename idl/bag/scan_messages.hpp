@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "core/dataset/scan_source.hpp"
@@ -55,5 +56,8 @@ inline constexpr std::string_view gnss_message_type = "sensor_msgs/msg/NavSatFix
 /// The stamp of a message that begins with a std_msgs/Header; 12 bytes are enough. Nothing when
 /// there is none.
 [[nodiscard]] std::optional<std::int64_t> header_stamp_ns(std::span<const std::uint8_t> message);
+
+/// The frame of such a message; nothing when the bytes do not reach to its end.
+[[nodiscard]] std::optional<std::string> header_frame(std::span<const std::uint8_t> message);
 
 }  // namespace stillmap::dds

@@ -474,5 +474,14 @@ TEST(ScanDataset, SaysFromWhichFieldsAScanIsAndThatItMadeUpStamps) {
               ElementsAre(HasSubstr("intensity from brightness (uint8), no time")));
 }
 
+TEST(ScanDataset, TakesTheKindThatAFolderHasMostOfInWhateverLetters) {
+  const ScratchFolder folder;
+  for (const char* name : {"1.PCD", "2.pcd"}) (void)folder.file(name, pcd());
+  (void)folder.file("extrinsics.bin", std::string(64, '\0'));
+  const ScanDataset dataset(folder.path());
+  EXPECT_THAT(names_of(dataset), ElementsAre("1.PCD", "2.pcd"));
+  EXPECT_EQ(dataset.read(0).scan.size(), 1U);
+}
+
 }  // namespace
 }  // namespace stillmap

@@ -463,5 +463,14 @@ TEST(BagScanSource, SaysFromWhichFieldsAScanIsAndTakesThoseThatItIsTold) {
   EXPECT_TRUE(dataset.read(0).scan.time_offset_s.empty());
 }
 
+TEST(BagScanSource, NamesTheFramesOfSeveralLidarsOnOneTopic) {
+  const ScratchFolder folder;
+  const auto rear = [](int k) { return serialized(wire::to_cloud(bag_scan(k), {}, "rear")); };
+  write_bag(folder / "bag", {bag_message(0), rear(1), bag_message(2)});
+  EXPECT_THAT(
+      open_recording(folder / "bag").faults,
+      testing::ElementsAre(AllOf(HasSubstr("/points"), HasSubstr("'lidar' (2), 'rear' (1)"))));
+}
+
 }  // namespace
 }  // namespace stillmap::dds
