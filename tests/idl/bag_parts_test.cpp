@@ -2,11 +2,14 @@
 // what is left out is told.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 #include <zstd.h>
 
+#include <cstdlib>
 #include <fstream>
 
 #include "core/dataset/dataset_error.hpp"
+#include "core/process/temporary_folder.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 #include "tests/idl/bag_fixture.hpp"
 #include "tests/scratch_folder.hpp"
@@ -142,6 +145,24 @@ TEST_F(BagPartsTest, ADamagedPartLeavesTheOthersReadable) {
   expect_scans(recording, {2, 3, 4, 5});
   EXPECT_THAT(recording.faults,
               ElementsAre(AllOf(HasSubstr("f_0.db3.zstd"), HasSubstr("cut off"))));
+}
+
+// As a signal ends it, which no destructor sees.
+TEST_F(BagPartsTest, WhatIsUnpackedGoesWithTheProcess) {
+  write_parts();
+  pack(file(0));
+  const fs::path unpacked = folder_ / "unpacked";
+  fs::create_directories(unpacked);
+  EXPECT_EXIT(
+      {
+        setenv("TMPDIR", unpacked.c_str(), 1);
+        const Bag bag(bag_);
+        const bool lies_there = !fs::is_empty(unpacked);
+        TemporaryFolder::remove_all_at_end();
+        _exit(lies_there ? 0 : 1);
+      },
+      testing::ExitedWithCode(0), "");
+  EXPECT_TRUE(fs::is_empty(unpacked));
 }
 
 TEST(Bag, UnpacksMessagesWithoutBeingTold) {
