@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <string_view>
+#include <tuple>
+#include <utility>
 
 namespace stillmap::dds {
 namespace {
@@ -108,50 +111,90 @@ std::vector<std::string> incompatible_policies(const Endpoint& writer, const End
 
 namespace {
 
-/// Whether some endpoint of the participant matches this one.
-bool reaches(const RemoteParticipant& participant, const Endpoint& endpoint) {
-  return std::ranges::any_of(participant.endpoints, [&](const Endpoint& other) {
-    if (other.is_writer == endpoint.is_writer || other.topic != endpoint.topic) return false;
-    return (endpoint.is_writer ? incompatible_policies(endpoint, other)
-                               : incompatible_policies(other, endpoint))
-        .empty();
-  });
+struct ByWhatMatches {
+  bool operator()(const Endpoint* one, const Endpoint* other) const {
+    return std::tie(one->type, one->is_keyed, one->qos) <
+           std::tie(other->type, other->is_keyed, other->qos);
+  }
+};
+
+/// Endpoints of one participant on one topic; of those that are alike, one: a process may have
+/// hundreds.
+using Ends = std::set<const Endpoint*, ByWhatMatches>;
+using EndsOfEach = std::map<const RemoteParticipant*, Ends>;
+
+struct OnTopic {
+  EndsOfEach writers;
+  EndsOfEach readers;
+};
+
+void add_endpoints(const RemoteParticipant& participant,
+                   std::map<std::string_view, OnTopic>& topics) {
+  for (const Endpoint& endpoint : participant.endpoints) {
+    OnTopic& topic = topics[endpoint.topic];
+    (endpoint.is_writer ? topic.writers : topic.readers)[&participant].insert(&endpoint);
+  }
+}
+
+/// What keeps each of these writers from these readers; a writer that one of them gets is none.
+std::set<Reasons> reasons_between(const Ends& writers, const Ends& readers) {
+  std::set<Reasons> all;
+  for (const Endpoint* writer : writers) {
+    std::set<Reasons> of_writer;
+    // One of two readers is enough: a reliable one, and one for best-effort writers.
+    const bool reaches = std::ranges::any_of(readers, [&](const Endpoint* reader) {
+      auto reasons = incompatible_policies(*writer, *reader);
+      if (reasons.empty()) return true;
+      of_writer.insert(std::move(reasons));
+      return false;
+    });
+    if (!reaches) all.merge(of_writer);
+  }
+  return all;
+}
+
+/// `self`: of whom one side must be; null: of anybody.
+void compare(std::string_view name, const OnTopic& topic, const RemoteParticipant* self,
+             Mismatches& mismatches) {
+  for (const auto& [writing, writers] : topic.writers) {
+    for (const auto& [reading, readers] : topic.readers) {
+      if (writing == reading) continue;
+      if (self != nullptr && writing != self && reading != self) continue;
+      for (const Reasons& reasons : reasons_between(writers, readers)) {
+        if (mismatches.found.size() == max_mismatches) {
+          ++mismatches.left_out;
+          continue;
+        }
+        mismatches.found.push_back({.topic = std::string(name),
+                                    .writer_participant = writing,
+                                    .reader_participant = reading,
+                                    .incompatible_policies = reasons});
+      }
+    }
+  }
+}
+
+Mismatches compare(const std::map<std::string_view, OnTopic>& topics,
+                   const RemoteParticipant* self) {
+  Mismatches mismatches;
+  for (const auto& [name, topic] : topics) compare(name, topic, self, mismatches);
+  return mismatches;
 }
 
 }  // namespace
 
-std::vector<Mismatch> mismatches(const std::vector<RemoteParticipant>& participants) {
-  struct Match {
-    const RemoteParticipant* peer;
-    const Endpoint* endpoint;
-  };
-  std::multimap<std::string, Match> readers;
-  for (const RemoteParticipant& peer : participants) {
-    for (const Endpoint& endpoint : peer.endpoints) {
-      if (!endpoint.is_writer) readers.emplace(endpoint.topic, Match{&peer, &endpoint});
-    }
-  }
-  std::vector<Mismatch> found;
-  for (const RemoteParticipant& peer : participants) {
-    for (const Endpoint& writer : peer.endpoints) {
-      if (!writer.is_writer) continue;
-      const auto [begin, end] = readers.equal_range(writer.topic);
-      for (auto it = begin; it != end; ++it) {
-        const Match& reader = it->second;
-        if (reader.peer == &peer) continue;
-        auto reasons = incompatible_policies(writer, *reader.endpoint);
-        // One of two readers is enough: a reliable one, and one for best-effort writers.
-        if (reasons.empty() || reaches(*reader.peer, writer)) continue;
-        found.push_back({.topic = writer.topic,
-                         .writer = writer,
-                         .reader = *reader.endpoint,
-                         .writer_participant = peer,
-                         .reader_participant = *reader.peer,
-                         .incompatible_policies = std::move(reasons)});
-      }
-    }
-  }
-  return found;
+Mismatches mismatches(const std::vector<RemoteParticipant>& participants) {
+  std::map<std::string_view, OnTopic> topics;
+  for (const RemoteParticipant& participant : participants) add_endpoints(participant, topics);
+  return compare(topics, nullptr);
+}
+
+Mismatches mismatches_of(const RemoteParticipant& self,
+                         const std::vector<RemoteParticipant>& peers) {
+  std::map<std::string_view, OnTopic> topics;
+  add_endpoints(self, topics);
+  for (const RemoteParticipant& peer : peers) add_endpoints(peer, topics);
+  return compare(topics, &self);
 }
 
 }  // namespace stillmap::dds

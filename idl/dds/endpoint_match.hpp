@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -13,19 +14,32 @@ namespace stillmap::dds {
 [[nodiscard]] std::vector<std::string> incompatible_policies(const Endpoint& writer,
                                                              const Endpoint& reader);
 
-/// A writer and a reader of one topic that do not match.
+/// Writers of one participant and readers of another one, on one topic, that do not match.
 struct Mismatch {
   std::string topic;
-  Endpoint writer;
-  Endpoint reader;
-  /// Whose they are.
-  RemoteParticipant writer_participant;
-  RemoteParticipant reader_participant;
+  /// Whose they are; among the participants that were compared.
+  const RemoteParticipant* writer_participant = nullptr;
+  const RemoteParticipant* reader_participant = nullptr;
   std::vector<std::string> incompatible_policies;
 };
 
-/// Every writer and reader of different participants on the same topic that do not match, unless
-/// another reader of the same participant does.
-[[nodiscard]] std::vector<Mismatch> mismatches(const std::vector<RemoteParticipant>& participants);
+/// However many endpoints a domain has, so many of them are named.
+inline constexpr std::size_t max_mismatches = 50;
+
+struct Mismatches {
+  /// `max_mismatches` at most.
+  std::vector<Mismatch> found;
+  /// How many more there are.
+  std::size_t left_out = 0;
+};
+
+/// Where writers and readers of different participants on the same topic do not match, unless
+/// another reader of the same participant does: once for two participants, a topic and what keeps
+/// them apart. The participants must outlive the result.
+[[nodiscard]] Mismatches mismatches(const std::vector<RemoteParticipant>& participants);
+
+/// The same, only between `self` and each of its peers.
+[[nodiscard]] Mismatches mismatches_of(const RemoteParticipant& self,
+                                       const std::vector<RemoteParticipant>& peers);
 
 }  // namespace stillmap::dds

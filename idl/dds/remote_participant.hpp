@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <compare>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -26,6 +27,8 @@ struct EndpointQos {
   bool exclusive_ownership = false;
   /// None is the partition without a name.
   std::vector<std::string> partitions;
+
+  auto operator<=>(const EndpointQos&) const = default;
 };
 
 /// A reader or writer somewhere in the domain.

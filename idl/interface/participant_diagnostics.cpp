@@ -103,22 +103,30 @@ Diagnostic to_diagnostic(const Mismatch& mismatch) {
   // Without it, ROS 2 tools show no node names; data flows.
   const bool harmless = mismatch.topic == ros_discovery_topic;
   return {.severity = harmless ? Severity::advice : Severity::problem,
-          .what = mismatch.topic + ": what " + display_name(mismatch.writer_participant) +
-                  " writes does not reach " + display_name(mismatch.reader_participant),
+          .what = mismatch.topic + ": what " + display_name(*mismatch.writer_participant) +
+                  " writes does not reach " + display_name(*mismatch.reader_participant),
           .evidence = joined(mismatch.incompatible_policies) +
-                      "; writer: " + describe(mismatch.writer_participant) +
-                      ", reader: " + describe(mismatch.reader_participant),
+                      "; writer: " + describe(*mismatch.writer_participant) +
+                      ", reader: " + describe(*mismatch.reader_participant),
           .hint = hints_for(mismatch.incompatible_policies)};
 }
 
-std::vector<Diagnostic> mismatch_diagnostics(const std::vector<Mismatch>& mismatches) {
+std::vector<Diagnostic> mismatch_diagnostics(const Mismatches& mismatches) {
   std::vector<Diagnostic> diagnostics;
-  for (const Mismatch& mismatch : mismatches) {
+  for (const Mismatch& mismatch : mismatches.found) {
     Diagnostic diagnostic = to_diagnostic(mismatch);
     const bool is_known = std::ranges::any_of(diagnostics, [&](const Diagnostic& known) {
       return known.what == diagnostic.what && known.evidence == diagnostic.evidence;
     });
     if (!is_known) diagnostics.push_back(std::move(diagnostic));
+  }
+  if (mismatches.left_out > 0) {
+    diagnostics.push_back(
+        {.severity = Severity::problem,
+         .what = "more writers and readers do not match: " + std::to_string(mismatches.left_out),
+         .evidence = "only the first " + std::to_string(mismatches.found.size()) + " are listed",
+         .hint = "mend those that are listed, or give programs that have nothing to do with each "
+                 "other domains of their own"});
   }
   return diagnostics;
 }

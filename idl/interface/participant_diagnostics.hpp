@@ -15,8 +15,8 @@ inline constexpr const char* survey_participant = "stillmap_survey";
 /// Of a writer and a reader that do not match.
 [[nodiscard]] Diagnostic to_diagnostic(const Mismatch& mismatch);
 
-/// Of every pair that does not match, each reason between two participants once.
-[[nodiscard]] std::vector<Diagnostic> mismatch_diagnostics(const std::vector<Mismatch>& mismatches);
+/// Of each that was found, those once that say the same; and how many more there are.
+[[nodiscard]] std::vector<Diagnostic> mismatch_diagnostics(const Mismatches& mismatches);
 
 /// Of participants that DDS Security keeps from `self`: secured on one side only, or refused.
 [[nodiscard]] std::vector<Diagnostic> security_diagnostics(

@@ -21,18 +21,6 @@ void log(const dds::Diagnostic& diagnostic) {
   spdlog::warn("{}: {}; {}", diagnostic.what, diagnostic.evidence, diagnostic.hint);
 }
 
-// Of all mismatched pairs of the domain, those with an endpoint of this server.
-std::vector<dds::Mismatch> own_mismatches(const dds::RemoteParticipant& self,
-                                          std::vector<dds::RemoteParticipant> peers) {
-  peers.push_back(self);
-  std::vector<dds::Mismatch> found = dds::mismatches(peers);
-  std::erase_if(found, [&](const dds::Mismatch& mismatch) {
-    return mismatch.writer_participant.guid != self.guid &&
-           mismatch.reader_participant.guid != self.guid;
-  });
-  return found;
-}
-
 std::string host_name() {
   std::array<char, 256> name{};
   ::gethostname(name.data(), name.size() - 1);
@@ -93,7 +81,7 @@ std::vector<dds::Diagnostic> DiscoveryDiagnostics::collect() {
   const dds::RemoteParticipant self = participant_.self();
   const std::vector<dds::RemoteParticipant> peers = participant_.remote_participants();
   std::vector<dds::Diagnostic> all = dds::namesake_diagnostics(name_space_, namesakes(peers));
-  for (dds::Diagnostic& diagnostic : dds::mismatch_diagnostics(own_mismatches(self, peers))) {
+  for (dds::Diagnostic& diagnostic : dds::mismatch_diagnostics(dds::mismatches_of(self, peers))) {
     all.push_back(std::move(diagnostic));
   }
   for (dds::Diagnostic& diagnostic : dds::security_diagnostics(self, peers)) {

@@ -85,10 +85,11 @@ TEST_F(EndpointMatch, LooksAtEveryPairOfDifferentPeersOnce) {
   server.endpoints = {reader_};
   other.endpoints = {end(true), writer_};
   other.endpoints.back().topic = "rt/elsewhere";
-  const auto pairs = dds::mismatches({lidar, server, other});
+  const std::vector everybody{lidar, server, other};
+  const auto pairs = dds::mismatches(everybody).found;
   ASSERT_THAT(pairs, SizeIs(1));
-  EXPECT_EQ(pairs[0].writer_participant.name, "lidar");
-  EXPECT_EQ(pairs[0].reader_participant.name, "server");
+  EXPECT_EQ(pairs[0].writer_participant->name, "lidar");
+  EXPECT_EQ(pairs[0].reader_participant->name, "server");
 }
 
 TEST_F(EndpointMatch, IsContentWithOneOfTwoReaders) {
@@ -96,9 +97,41 @@ TEST_F(EndpointMatch, IsContentWithOneOfTwoReaders) {
   dds::RemoteParticipant lidar, server;
   lidar.endpoints = {writer_};
   server.endpoints = {reader_, reader_};
-  EXPECT_THAT(dds::mismatches({lidar, server}), SizeIs(2));
+  EXPECT_THAT(dds::mismatches_of(server, {lidar}).found, SizeIs(1));
   server.endpoints[1].qos.reliable = false;
-  EXPECT_THAT(dds::mismatches({lidar, server}), IsEmpty());
+  EXPECT_THAT(dds::mismatches_of(server, {lidar}).found, IsEmpty());
+}
+
+TEST_F(EndpointMatch, TakesEndpointsThatAreAlikeForOne) {
+  writer_.qos.reliable = false;
+  dds::RemoteParticipant sensors, viewers, self;
+  sensors.endpoints.assign(3000, writer_);
+  viewers.endpoints.assign(3000, reader_);
+  const auto found = dds::mismatches({sensors, viewers, self});
+  EXPECT_THAT(found.found, SizeIs(1));
+  EXPECT_EQ(found.left_out, 0U);
+}
+
+TEST_F(EndpointMatch, OfOneParticipantIsNoMatterOfOthersOnly) {
+  writer_.qos.reliable = false;
+  dds::RemoteParticipant sensors, viewers, self;
+  sensors.endpoints = {writer_};
+  viewers.endpoints = {reader_};
+  EXPECT_THAT(dds::mismatches_of(self, {sensors, viewers}).found, IsEmpty());
+  self.endpoints = {reader_};
+  EXPECT_THAT(dds::mismatches_of(self, {sensors, viewers}).found, SizeIs(1));
+}
+
+TEST_F(EndpointMatch, NamesABoundedNumberAndCountsTheRest) {
+  dds::RemoteParticipant sensors, self;
+  self.endpoints = {reader_};
+  for (std::size_t i = 0; i < dds::max_mismatches + 7; ++i) {
+    writer_.type = "type_" + std::to_string(i);
+    sensors.endpoints.push_back(writer_);
+  }
+  const auto found = dds::mismatches_of(self, {sensors});
+  EXPECT_THAT(found.found, SizeIs(dds::max_mismatches));
+  EXPECT_EQ(found.left_out, 7U);
 }
 
 }  // namespace

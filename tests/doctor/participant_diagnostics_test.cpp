@@ -84,19 +84,20 @@ TEST(ParticipantDiagnosticsTest, NameOtherServersOfAName) {
 }
 
 TEST(ParticipantDiagnosticsTest, SayEachMismatchOnceWithItsRemedy) {
+  const dds::RemoteParticipant lidar = participant("lidar"), server = participant("server");
   const dds::Mismatch mismatch{.topic = "rt/points",
-                               .writer = {},
-                               .reader = {},
-                               .writer_participant = participant("lidar"),
-                               .reader_participant = participant("server"),
+                               .writer_participant = &lidar,
+                               .reader_participant = &server,
                                .incompatible_policies = {"reliability: x", "durability: y"}};
-  const auto diagnostics = dds::mismatch_diagnostics({mismatch, mismatch});
+  const auto diagnostics =
+      dds::mismatch_diagnostics({.found = {mismatch, mismatch}, .left_out = 0});
   ASSERT_THAT(diagnostics, SizeIs(1));
   EXPECT_EQ(diagnostics[0].what, "rt/points: what lidar writes does not reach server");
   EXPECT_THAT(diagnostics[0].hint, AllOf(HasSubstr("best effort"), HasSubstr("transient local")));
   dds::Mismatch harmless = mismatch;
   harmless.topic = "ros_discovery_info";
   EXPECT_EQ(dds::to_diagnostic(harmless).severity, dds::Severity::advice);
+  EXPECT_THAT(dds::mismatch_diagnostics({.found = {mismatch}, .left_out = 9}).back(), tells("9"));
 }
 
 /// A publisher on this host, and the server.
