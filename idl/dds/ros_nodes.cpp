@@ -14,6 +14,9 @@ namespace {
 // Announcements between two looks; each process announces its endpoints as they come.
 constexpr int max_waiting_announcements = 1000;
 
+// A node has some 100 bytes, and 24 for each of its endpoints; in memory its names alone have 512.
+constexpr std::size_t max_announcement_bytes = 1'000'000;
+
 /// Nothing when the bytes are a sample of another layout.
 template <typename Info>
 std::vector<std::string> names_in(SerializedSample& announcement) {
@@ -36,6 +39,7 @@ std::vector<std::string> names_in(SerializedSample& announcement) {
 }  // namespace
 
 std::vector<std::string> ros_node_names(SerializedSample announcement) {
+  if (announcement.size() > max_announcement_bytes) return {};
   auto names = names_in<rmw_dds_common::msg::ParticipantEntitiesInfo>(announcement);
   if (!names.empty()) return names;
   return names_in<rmw_dds_common_iron::msg::ParticipantEntitiesInfo>(announcement);

@@ -11,7 +11,8 @@
 namespace stillmap::dds {
 
 /// Names of the nodes that a sample of ros_discovery_info announces ("/rviz2"), whether its GIDs
-/// have 24 bytes (up to ROS 2 Humble) or 16; none when it is no such sample.
+/// have 24 bytes (up to ROS 2 Humble) or 16; none when it is no such sample, or has more
+/// than 1 MB.
 [[nodiscard]] std::vector<std::string> ros_node_names(SerializedSample announcement);
 
 /// Which ROS 2 nodes the participants of the domain hold, as they announce it: ROS 2 gives its
