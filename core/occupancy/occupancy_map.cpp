@@ -3,6 +3,7 @@
 #include <octomap/OcTree.h>
 
 #include <algorithm>
+#include <limits>
 #include <set>
 #include <span>
 #include <sstream>
@@ -213,7 +214,8 @@ PointOccupancy OccupancyMap::at_point(const Eigen::Vector3d& p_map) const {
 
 BoxOccupancy OccupancyMap::in_box(const Eigen::AlignedBox3d& box_map,
                                   std::size_t max_voxels) const {
-  return query_box(state_->octree, box_map, max_voxels);
+  std::size_t nodes_left = std::numeric_limits<std::size_t>::max();
+  return query_box(state_->octree, box_map, max_voxels, nodes_left);
 }
 
 RayOccupancy OccupancyMap::along_ray(const RayQuery& ray) const {
@@ -227,8 +229,9 @@ OccupancyAnswers OccupancyMap::answer(const OccupancyQuery& query) const {
   OccupancyAnswers answers{.resolution_m = resolution_m(), .points = {}, .boxes = {}, .rays = {}};
   for (const Eigen::Vector3d& p_map : query.points_map) answers.points.push_back(at_point(p_map));
   std::size_t voxels_left = query.max_voxels;
+  std::size_t nodes_left = OccupancyQuery::max_box_nodes;
   for (const Eigen::AlignedBox3d& box_map : query.boxes_map) {
-    answers.boxes.push_back(in_box(box_map, voxels_left));
+    answers.boxes.push_back(query_box(state_->octree, box_map, voxels_left, nodes_left));
     voxels_left -= answers.boxes.back().occupied_map.size();
   }
   for (const RayQuery& ray : query.rays) answers.rays.push_back(along_ray(ray));

@@ -55,14 +55,25 @@ octomap::OcTreeKey tree_key(const VoxelKey& voxel) {
 class BoxCount {
  public:
   BoxCount(const OcTree& octree, const VoxelKey& first, const VoxelKey& last,
-           std::size_t max_voxels, BoxOccupancy& result)
-      : octree_(octree), first_(first), last_(last), max_voxels_(max_voxels), result_(result) {}
+           std::size_t max_voxels, std::size_t& nodes_left, BoxOccupancy& result)
+      : octree_(octree),
+        first_(first),
+        last_(last),
+        max_voxels_(max_voxels),
+        nodes_left_(nodes_left),
+        result_(result) {}
+
+  /// Whether all of it was counted.
+  [[nodiscard]] bool is_whole() const { return is_whole_; }
 
   /// `corner` is the lowest voxel of the node, `side` its voxels along an edge.
   void count(const OcTreeNode& node, const VoxelKey& corner, std::int32_t side) {
     const VoxelKey from = corner.cwiseMax(first_);
     const VoxelKey to = (corner.array() + (side - 1)).matrix().cwiseMin(last_);
     if ((from.array() > to.array()).any()) return;
+    if (nodes_left_ == 0) is_whole_ = false;
+    if (!is_whole_) return;
+    --nodes_left_;
     if (!octree_.nodeHasChildren(&node)) {
       count_leaf(node, from, to);
       return;
@@ -104,7 +115,9 @@ class BoxCount {
   VoxelKey first_;
   VoxelKey last_;
   std::size_t max_voxels_;
+  std::size_t& nodes_left_;
   BoxOccupancy& result_;
+  bool is_whole_ = true;
 };
 
 std::string box_fault(const OcTree& octree, const Eigen::AlignedBox3d& box_map) {
@@ -151,14 +164,23 @@ PointOccupancy query_point(const OcTree& octree, const Eigen::Vector3d& p_map) {
 }
 
 BoxOccupancy query_box(const OcTree& octree, const Eigen::AlignedBox3d& box_map,
-                       std::size_t max_voxels) {
+                       std::size_t max_voxels, std::size_t& nodes_left) {
   BoxOccupancy result;
   result.fault = box_fault(octree, box_map);
   if (!result.fault.empty()) return result;
   const VoxelKey first = in_voxels(octree, box_map.min()).array().floor().cast<std::int32_t>();
   const VoxelKey last = in_voxels(octree, box_map.max()).array().floor().cast<std::int32_t>();
   if (const OcTreeNode* const root = octree.getRoot(); root != nullptr) {
-    BoxCount(octree, first, last, max_voxels, result).count(*root, VoxelKey::Zero(), octree_side);
+    BoxCount count(octree, first, last, max_voxels, nodes_left, result);
+    count.count(*root, VoxelKey::Zero(), octree_side);
+    if (!count.is_whole()) {
+      BoxOccupancy refused;
+      refused.fault =
+          "the boxes up to this one have more than " +
+          std::to_string(OccupancyQuery::max_box_nodes) +
+          " nodes of the occupancy map; ask for fewer or smaller ones, in several requests";
+      return refused;
+    }
   }
   const auto all = static_cast<std::uint64_t>(
       ((last - first).cast<std::int64_t>().array() + std::int64_t{1}).prod());

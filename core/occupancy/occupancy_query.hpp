@@ -73,6 +73,9 @@ struct OccupancyQuery {
   static constexpr std::size_t max_boxes = 100;
   static constexpr std::size_t max_rays = 1000;
   static constexpr std::uint32_t max_listed_voxels = 100'000;
+  /// Nodes of the octree that all boxes together may have: about half a second's work, in which
+  /// the octree does not grow.
+  static constexpr std::size_t max_box_nodes = 20'000'000;
 
   /// One line for each limit that the request exceeds; empty when it can be answered.
   [[nodiscard]] std::string faults() const;
@@ -92,9 +95,11 @@ struct OccupancyAnswers {
 [[nodiscard]] PointOccupancy query_point(const octomap::OcTree& octree,
                                          const Eigen::Vector3d& p_map);
 
-/// At most `max_voxels` occupied voxels are listed; all are counted.
+/// At most `max_voxels` occupied voxels are listed; all are counted. Takes the octree's nodes that
+/// it looks at from `nodes_left`, and returns a fault where they are not enough.
 [[nodiscard]] BoxOccupancy query_box(const octomap::OcTree& octree,
-                                     const Eigen::AlignedBox3d& box_map, std::size_t max_voxels);
+                                     const Eigen::AlignedBox3d& box_map, std::size_t max_voxels,
+                                     std::size_t& nodes_left);
 
 [[nodiscard]] RayOccupancy cast_ray(const octomap::OcTree& octree, const RayQuery& ray);
 

@@ -1,6 +1,7 @@
 #include "core/occupancy/occupancy_query.hpp"
 
 #include <gmock/gmock.h>
+#include <octomap/OcTree.h>
 
 #include <limits>
 
@@ -118,6 +119,20 @@ TEST_F(OccupancyQuery, HostileBoxesGetAReason) {
   EXPECT_THAT(fault(nan * one, nan * one), HasSubstr("nan"));
   // As large as the map: counted at once.
   EXPECT_EQ(fault(-6553.0 * one, 6553.0 * one), "");
+}
+
+TEST(OccupancyOfManyBoxes, EndsWhereItTakesTooLong) {
+  octomap::OcTree octree(0.1);
+  for (const float x : {0.05F, 5.05F, -7.05F}) octree.updateNode(x, 0.05F, 0.05F, true);
+  const Eigen::AlignedBox3d all(Eigen::Vector3d::Constant(-100), Eigen::Vector3d::Constant(100));
+  std::size_t nodes_left = octree.size();
+  EXPECT_EQ(query_box(octree, all, 10, nodes_left).occupied, 3U);
+  EXPECT_EQ(nodes_left, 0U);
+  nodes_left = octree.size() - 1;
+  const BoxOccupancy cut = query_box(octree, all, 10, nodes_left);
+  EXPECT_THAT(cut.fault, HasSubstr("several requests"));
+  EXPECT_EQ(cut.occupied + cut.occupied_map.size(), 0U);
+  EXPECT_THAT(query_box(octree, all, 10, nodes_left).fault, HasSubstr("several requests"));
 }
 
 TEST_F(OccupancyQuery, HostileRaysGetAReason) {
