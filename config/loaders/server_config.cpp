@@ -191,35 +191,29 @@ void read_dds(YamlSection section, const fs::path& folder, DdsConfig& dds) {
   }
 }
 
-/// What an entry with this name says when it is refused.
-std::string topic_fault(const std::string& name) {
-  return "'" + name + "'" + std::string(topic_rule);
+void check_topic(YamlSection& section, const std::string& field, std::string& name) {
+  if (const std::string fault = to_topic_name(name); !fault.empty()) section.fault(field, fault);
+}
+
+void read_topic(YamlSection& section, const std::string& field, std::string& name) {
+  section.text(field, name);
+  check_topic(section, field, name);
+}
+
+/// Of one that may be off, which is empty.
+void read_topic_or_empty(YamlSection& section, const std::string& field, std::string& name) {
+  section.text(field, name);
+  if (!name.empty()) check_topic(section, field, name);
 }
 
 /// Whether the file names the topic of the one lidar.
 bool read_topics(YamlSection section, TopicsConfig& topics) {
-  section.text("points", topics.points);
-  section.text("namespace", topics.name_space);
-  section.text("odometry_prior", topics.odometry_prior);
-  section.text("imu", topics.imu);
-  section.text("gnss", topics.gnss);
-  section.text("initial_pose", topics.initial_pose);
-  if (!is_topic_name(topics.points)) section.fault("points", topic_fault(topics.points));
-  if (!is_topic_name(topics.name_space)) {
-    section.fault("namespace", topic_fault(topics.name_space));
-  }
-  if (!topics.odometry_prior.empty() && !is_topic_name(topics.odometry_prior)) {
-    section.fault("odometry_prior", topic_fault(topics.odometry_prior));
-  }
-  if (!topics.imu.empty() && !is_topic_name(topics.imu)) {
-    section.fault("imu", topic_fault(topics.imu));
-  }
-  if (!topics.gnss.empty() && !is_topic_name(topics.gnss)) {
-    section.fault("gnss", topic_fault(topics.gnss));
-  }
-  if (!topics.initial_pose.empty() && !is_topic_name(topics.initial_pose)) {
-    section.fault("initial_pose", topic_fault(topics.initial_pose));
-  }
+  read_topic(section, "points", topics.points);
+  read_topic(section, "namespace", topics.name_space);
+  read_topic_or_empty(section, "odometry_prior", topics.odometry_prior);
+  read_topic_or_empty(section, "imu", topics.imu);
+  read_topic_or_empty(section, "gnss", topics.gnss);
+  read_topic_or_empty(section, "initial_pose", topics.initial_pose);
   return section.has("points");
 }
 
@@ -309,7 +303,7 @@ LidarConfig read_lidar(YamlSection& section, const fs::path& folder) {
   if (lidar.name.empty() || !is_word) {
     section.fault("name", "'" + lidar.name + "'; names have letters, digits and '_'");
   }
-  if (!is_topic_name(lidar.topic)) section.fault("topic", topic_fault(lidar.topic));
+  check_topic(section, "topic", lidar.topic);
   return lidar;
 }
 

@@ -8,14 +8,25 @@
 namespace stillmap {
 
 inline constexpr std::string_view topic_rule =
-    "; ROS 2 names have letters, digits, '_', and '/' inside";
+    "; ROS 2 names have letters, digits, '_', and '/' between parts that begin with no digit";
 
-/// Whether it is a ROS 2 name without the '/' at its front.
+/// Whether a part of a name begins with a digit.
+[[nodiscard]] inline bool has_part_with_digit_first(std::string_view name) {
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    const bool is_first = i == 0 || name[i - 1] == '/';
+    if (is_first && name[i] >= '0' && name[i] <= '9') return true;
+  }
+  return false;
+}
+
+/// Whether it is a ROS 2 name without the '/' at its front. No node can use one with a part that
+/// begins with a digit.
 [[nodiscard]] inline bool is_topic_name(std::string_view name) {
   constexpr std::string_view allowed =
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_/";
   return !name.empty() && name.find_first_not_of(allowed) == std::string_view::npos &&
-         name.front() != '/' && name.back() != '/' && name.find("//") == std::string_view::npos;
+         name.front() != '/' && name.back() != '/' && name.find("//") == std::string_view::npos &&
+         !has_part_with_digit_first(name);
 }
 
 /// Takes away the '/' at the front with which ROS 2's own tools print names. Returns what is wrong

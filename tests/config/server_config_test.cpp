@@ -259,6 +259,14 @@ TEST(ServerConfig, RefusesValuesOfTheWrongKind) {
   EXPECT_THAT(refusal_of("labels: {model: [a]}"), HasSubstr("a text"));
 }
 
+TEST(ServerConfig, TakesTopicsAsRosToolsPrintThem) {
+  const ServerConfig config =
+      load("topics: {points: /velodyne_points, namespace: /stillmap, imu: /imu/data2}");
+  EXPECT_EQ(config.topics.points, "velodyne_points");
+  EXPECT_EQ(config.topics.name_space, "stillmap");
+  EXPECT_EQ(config.topics.imu, "imu/data2");
+}
+
 TEST(ServerConfig, RefusesValuesThatDoNotFitTogether) {
   EXPECT_THAT(refusal_of("labels: {model: \"\"}"), HasSubstr("give a model's name"));
   EXPECT_THAT(refusal_of("prepare: {min_range_m: 200, max_range_m: 100}"),
@@ -271,7 +279,8 @@ TEST(ServerConfig, RefusesValuesThatDoNotFitTogether) {
   EXPECT_THAT(refusal_of("dds: {interfaces: [eth0]}"), HasSubstr("not an IPv4 address"));
   EXPECT_THAT(refusal_of("dds: {profile: ether}"), HasSubstr("DDS profile 'ether'"));
   EXPECT_THAT(refusal_of("topics: {points: 'a b'}"), HasSubstr("topics.points"));
-  EXPECT_THAT(refusal_of("topics: {gnss: '/fix'}"), HasSubstr("topics.gnss"));
+  EXPECT_THAT(refusal_of("topics: {points: 1abc}"), HasSubstr("begin with no digit"));
+  EXPECT_THAT(refusal_of("topics: {gnss: robot/2/fix}"), HasSubstr("topics.gnss"));
   EXPECT_THAT(refusal_of("topics: {gnss: fix}\nmap: {close_loops: false}"),
               HasSubstr("needs map.close_loops"));
   EXPECT_THAT(refusal_of("gnss: {antenna_m: [1, 2]}"), HasSubstr("wanted are three"));
