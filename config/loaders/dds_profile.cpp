@@ -3,6 +3,8 @@
 #include <arpa/inet.h>
 
 #include <charconv>
+#include <cstdlib>
+#include <string_view>
 
 #include "config/loaders/named_file.hpp"
 #include "config/loaders/yaml_section.hpp"
@@ -144,6 +146,16 @@ std::optional<dds::NetworkAddress> network_address_from(const std::string& text)
   const auto [stop, error] = std::from_chars(text.data() + colon + 1, end, address.port);
   if (error != std::errc{} || stop != end || address.port == 0) return std::nullopt;
   return address;
+}
+
+std::string usual_dds_profile() {
+  const auto is_set = [](const char* variable, std::string_view value) {
+    const char* const found = std::getenv(variable);
+    return found != nullptr && found == value;
+  };
+  const bool is_local =
+      is_set("ROS_LOCALHOST_ONLY", "1") || is_set("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST");
+  return is_local ? "host" : "lan";
 }
 
 DdsProfile read_dds_profile(const fs::path& file) {

@@ -32,10 +32,14 @@ struct DdsProfile {
 /// "HOST" or "HOST:PORT"; nothing when it is neither.
 [[nodiscard]] std::optional<dds::NetworkAddress> network_address_from(const std::string& text);
 
+/// The profile where none is chosen: host where the variables by which ROS 2 nodes stay on their
+/// machine say so (ROS_LOCALHOST_ONLY=1, ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST), else lan.
+[[nodiscard]] std::string usual_dds_profile();
+
 /// What one deployment says: a profile, and what differs from it there.
 struct DdsNetworkConfig {
   /// As load_dds_profile takes it.
-  std::string profile = "lan";
+  std::string profile = usual_dds_profile();
   /// What is not given stays as the profile has it.
   std::optional<bool> shared_memory;
   std::vector<std::string> interfaces;

@@ -186,6 +186,7 @@ RemoteParticipant Participant::self() const {
   self.name = handle_->get_qos().name().to_string();
   // As the others name it.
   if (!options_.node_name.empty()) self.ros_nodes = {"/" + options_.node_name};
+  self.addresses = options_.interfaces;
   self.is_on_this_host = true;
   self.uses_shared_memory = has_shared_memory(handle_->get_qos());
   self.is_secured = identity_ != nullptr;

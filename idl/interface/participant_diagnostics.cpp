@@ -60,6 +60,13 @@ std::pair<const RemoteParticipant*, const Endpoint*> owner_of(
 
 constexpr std::string_view namesake_words = "another server is called ";
 
+bool is_on_loopback_only(const RemoteParticipant& participant) {
+  return !participant.addresses.empty() &&
+         std::ranges::all_of(participant.addresses, [](const std::string& address) {
+           return address.starts_with("127.");
+         });
+}
+
 constexpr const char* carriage_hint =
     "give the publisher's shared memory more room than a scan takes (Fast DDS: segment_size, 512 "
     "KB "
@@ -170,7 +177,16 @@ std::vector<Diagnostic> silent_participant_diagnostics(
   for (const RemoteParticipant& peer : peers) {
     const bool is_explained = peer.refused || peer.is_secured != self.is_secured;
     if (!peer.endpoints.empty() || is_explained || peer.name == survey_participant) continue;
-    if (peer.is_on_this_host && self.uses_shared_memory) {
+    if (is_on_loopback_only(peer) && !is_on_loopback_only(self)) {
+      diagnostics.push_back(
+          {.severity = Severity::problem,
+           .what = "nothing of " + display_name(peer) + " arrives: it keeps to this machine",
+           .evidence = describe(peer) +
+                       " is reached on the loopback interface only, as ROS 2 nodes "
+                       "with ROS_LOCALHOST_ONLY=1 are",
+           .hint = "localhost only: give Stillmap --dds-profile host (dds.profile: host), or the "
+                   "same variable; or take it from the nodes"});
+    } else if (peer.is_on_this_host && self.uses_shared_memory) {
       diagnostics.push_back(
           {.severity = Severity::problem,
            .what = "nothing of " + display_name(peer) + " arrives, though it runs on this host",

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <utility>
 
 #include "tests/config/config_files.hpp"
 
@@ -63,6 +64,18 @@ TEST(DdsProfileFile, LanIsWhatHoldsWithoutAnyFile) {
   EXPECT_EQ(lan.repair_delay_ms, built_in.repair_delay_ms);
   EXPECT_EQ(lan.lease_s, built_in.lease_s);
   EXPECT_EQ(lan.large_message_bytes_per_s, built_in.large_message_bytes_per_s);
+}
+
+TEST(DdsProfileFile, OfThisMachineIsUsualWhereRosKeepsToIt) {
+  EXPECT_EQ(DdsNetworkConfig().profile, "lan");
+  for (const auto& [variable, value] : {std::pair("ROS_LOCALHOST_ONLY", "1"),
+                                        std::pair("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")}) {
+    ASSERT_EQ(setenv(variable, value, 1), 0);
+    EXPECT_EQ(DdsNetworkConfig().profile, "host");
+    ASSERT_EQ(setenv(variable, "0", 1), 0);
+    EXPECT_EQ(DdsNetworkConfig().profile, "lan");
+    ASSERT_EQ(unsetenv(variable), 0);
+  }
 }
 
 TEST(DdsProfileFile, ShippedProfilesAreWhatTheirNamesSay) {

@@ -63,6 +63,13 @@ TEST(ParticipantDiagnosticsTest, BlameSharedMemoryForASilentPeerOnThisHost) {
   silent.is_on_this_host = false;
   EXPECT_THAT(dds::silent_participant_diagnostics(participant("self"), {silent}),
               ElementsAre(Field(&dds::Diagnostic::hint, HasSubstr("firewalls"))));
+  silent.addresses = {"127.0.0.1"};
+  EXPECT_THAT(dds::silent_participant_diagnostics(participant("self"), {silent}),
+              ElementsAre(Field(&dds::Diagnostic::hint, HasSubstr("--dds-profile host"))));
+  dds::RemoteParticipant beside = participant("self");
+  beside.addresses = {"127.0.0.1"};
+  EXPECT_THAT(dds::silent_participant_diagnostics(beside, {silent}),
+              ElementsAre(Field(&dds::Diagnostic::hint, HasSubstr("firewalls"))));
   silent.is_secured = true;
   EXPECT_THAT(dds::silent_participant_diagnostics(participant("self"), {silent}), IsEmpty());
 }
