@@ -6,6 +6,10 @@ void ServiceFaults::unreadable_request(const std::string& service) {
   add("unreadable_request", service);
 }
 
+void ServiceFaults::lost_requests(const std::string& service, std::uint64_t count) {
+  if (count > 0) add("lost_request", service, count);
+}
+
 void ServiceFaults::undelivered_reply(const std::string& service) {
   add("undelivered_reply", service);
 }
@@ -25,9 +29,9 @@ std::uint64_t ServiceFaults::count(const std::string& fault, const std::string& 
   return found == counts_.end() ? 0 : found->second;
 }
 
-void ServiceFaults::add(const char* fault, const std::string& service) {
+void ServiceFaults::add(const char* fault, const std::string& service, std::uint64_t times) {
   const std::scoped_lock lock(mutex_);
-  ++counts_[{fault, service}];
+  counts_[{fault, service}] += times;
 }
 
 }  // namespace stillmap::dds

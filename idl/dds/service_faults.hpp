@@ -12,7 +12,7 @@ namespace stillmap::dds {
 
 /// What kept requests of a service from an answer, and how often.
 struct ServiceFault {
-  /// "unreadable_request", "undelivered_reply" or "slow_client".
+  /// "unreadable_request", "lost_request", "undelivered_reply" or "slow_client".
   std::string fault;
   /// "stillmap/get_status".
   std::string service;
@@ -25,6 +25,8 @@ class ServiceFaults {
  public:
   /// A request that is not of the service's type: another version of it, or damaged.
   void unreadable_request(const std::string& service);
+  /// So many requests that never came to be read: more of them came than wait at a time.
+  void lost_requests(const std::string& service, std::uint64_t count);
   /// A reply that reached no client: it was never discovered, or left.
   void undelivered_reply(const std::string& service);
 
@@ -37,7 +39,7 @@ class ServiceFaults {
   [[nodiscard]] std::uint64_t count(const std::string& fault, const std::string& service) const;
 
  private:
-  void add(const char* fault, const std::string& service);
+  void add(const char* fault, const std::string& service, std::uint64_t times = 1);
 
   mutable std::mutex mutex_;
   std::map<std::pair<std::string, std::string>, std::uint64_t> counts_;

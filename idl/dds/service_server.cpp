@@ -101,6 +101,7 @@ std::optional<ServiceCall> UntypedServiceServer::take(void* request, const std::
 
 std::optional<ServiceCall> UntypedServiceServer::read(SerializedSample& bytes,
                                                       const SampleInfo& info, void* request) {
+  faults_.lost_requests(service_, request_losses_.add(info.sample_identity));
   ServiceCall call{.request_writer = info.sample_identity.writer_guid(),
                    .reply_identity = reply_identity(info),
                    .names_reply_reader = names_reply_reader(info),

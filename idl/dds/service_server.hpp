@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "idl/dds/reply_writer.hpp"
+#include "idl/dds/sample_losses.hpp"
 #include "idl/dds/service_faults.hpp"
 #include "idl/dds/service_identity.hpp"
 #include "idl/dds/type_support.hpp"
@@ -134,6 +135,7 @@ class UntypedServiceServer {
   TypeSupport reply_type_;
   ReplyWriter replies_;
   SerializedSampleReader requests_;
+  SampleLosses request_losses_;
   AnsweredRequests answered_;
   std::deque<WaitingReply> waiting_;
   std::size_t waiting_bytes_ = 0;

@@ -10,6 +10,7 @@
 
 #include "idl/dds/service_client.hpp"
 #include "idl/dds/service_server.hpp"
+#include "idl/dds/writer.hpp"
 #include "stillmap_msgs.h"
 #include "tests/idl/dds_fixture.hpp"
 
@@ -53,6 +54,29 @@ TEST(Service, AnswersEachClientWithItsOwnReply) {
     }
   }
   EXPECT_EQ(right, 60);
+}
+
+TEST(Service, CountsRequestsThatItHadNoRoomFor) {
+  Participant server_side(loopback(false));
+  std::promise<void> all_sent;
+  const Server server(server_side, "stillmap/save_map",
+                      [sent = all_sent.get_future().share()](const SaveMap_Request& request) {
+                        sent.wait();
+                        return echo(request);
+                      });
+  Participant client_side(loopback(false));
+  Writer<SaveMap_Request> requests(client_side, "rq/stillmap/save_mapRequest", {.depth = 500});
+  ASSERT_TRUE(requests.readers().wait_for_any(discovery_timeout));
+  ASSERT_TRUE(requests.write(request_for("")));
+  // It is being answered.
+  std::this_thread::sleep_for(500ms);
+  for (int i = 0; i < 300; ++i) ASSERT_TRUE(requests.write(request_for("")));
+  std::this_thread::sleep_for(500ms);
+  all_sent.set_value();
+  const auto lost = [&] {
+    return server_side.service_faults().count("lost_request", "stillmap/save_map");
+  };
+  EXPECT_TRUE(test::eventually([&] { return lost() == 200; }, discovery_timeout, 5ms)) << lost();
 }
 
 TEST(Service, CarriesAReplyOfMegabytes) {
