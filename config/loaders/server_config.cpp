@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
+#include <limits>
 #include <numbers>
 #include <sstream>
 #include <stdexcept>
@@ -135,6 +137,9 @@ void read_gnss(YamlSection section, GnssReceiverConfig& gnss) {
                                    " numbers; wanted are three, or none");
   }
   section.number("max_sigma_m", gnss.max_sigma_m, {0.01, 1000});
+  double time_offset_s = std::numeric_limits<double>::quiet_NaN();
+  section.number_or("auto", "time_offset_s", time_offset_s, {-100, 100});
+  if (!std::isnan(time_offset_s)) gnss.time_offset_s = time_offset_s;
 }
 
 void read_mount(YamlSection section, const FramesConfig& frames, MountConfig& mount) {

@@ -123,6 +123,8 @@ struct GnssReceiverConfig {
   std::optional<Eigen::Vector3d> antenna_base;
   /// Fixes that are said to be worse than this, east and north, are not used [m].
   double max_sigma_m = 20.0;
+  /// So much later than the robot was there are its stamps [s]; nothing: that is found out.
+  std::optional<double> time_offset_s;
 };
 
 struct InputConfig {

@@ -8,10 +8,11 @@
 namespace stillmap {
 namespace {
 
-/// Fixes come late by up to a second or two.
-constexpr std::size_t max_scans = 100;
-/// 50 s at 20 Hz.
-constexpr std::size_t max_waiting = 1000;
+/// More than an hour at 10 Hz of a robot that moves.
+constexpr std::size_t max_scans = 50'000;
+constexpr std::size_t max_known = 50'000;
+/// Of stamps ahead of the scans, half a minute at 100 Hz.
+constexpr std::size_t max_waiting = 3000;
 /// Between scans that are farther apart than both nobody knows where the antenna was.
 constexpr std::int64_t max_gap_ns = 1'500'000'000;
 constexpr double max_gap_m = 0.5;
@@ -23,6 +24,18 @@ constexpr double max_jump_m = 50e3;
 constexpr double max_step_m = 5e3;
 /// So few fixes of another place are a fault of the receiver.
 constexpr std::size_t min_strays = 5;
+/// Fixes that tell something of the way for another delay.
+constexpr double min_moved_m = 0.3;
+constexpr std::int64_t min_apart_ns = 1'000'000'000;
+/// The delay is judged after so much more way, and so much as a share of all.
+constexpr double judged_way_m = 50.0;
+constexpr double judged_share_of_way = 0.25;
+/// A delay, or an antenna, is another one by so much, and so many standard deviations. One that is
+/// known to be there is found out better.
+constexpr double min_delay_s = 0.02;
+constexpr double min_antenna_m = 0.3;
+constexpr double sigmas_of_another = 4.0;
+constexpr double sigmas_of_better = 2.0;
 
 double horizontal_sigma_m(const GnssFix& fix) {
   return std::sqrt(0.5 * fix.covariance_enu.topLeftCorner<2, 2>().trace());
@@ -59,7 +72,17 @@ std::string GnssTrack::add(const GnssFix& fix) {
     waiting_.back().covariance_enu.col(2).setZero();
     waiting_.back().covariance_enu(2, 2) = unknown_sigma_m * unknown_sigma_m;
   }
+  remember(waiting_.back());
   return "";
+}
+
+void GnssTrack::remember(const GnssFix& fix) {
+  if (config_.delay_s) return;
+  if (!known_.empty() && std::abs(fix.stamp_ns - known_.back().stamp_ns) < min_apart_ns &&
+      distance_m(known_.back(), fix) < min_moved_m)
+    return;
+  known_.push_back(fix);
+  if (known_.size() > max_known) known_.pop_front();
 }
 
 void GnssTrack::judge_origin(const GnssFix& fix) {
@@ -83,8 +106,11 @@ void GnssTrack::begin_at(const GnssFix& fix) {
   enu_ = frame_about(fix);
   last_believed_ = fix;
   ++origins_;
-  misplaced_ += std::erase_if(
-      waiting_, [&](const GnssFix& other) { return distance_m(fix, other) > max_jump_m; });
+  const auto is_elsewhere = [&](const GnssFix& other) {
+    return distance_m(fix, other) > max_jump_m;
+  };
+  misplaced_ += std::erase_if(waiting_, is_elsewhere);
+  std::erase_if(known_, is_elsewhere);
 }
 
 void GnssTrack::add_scan(std::size_t scan, std::int64_t stamp_ns,
@@ -94,8 +120,12 @@ void GnssTrack::add_scan(std::size_t scan, std::int64_t stamp_ns,
     scans_.clear();
     misplaced_ += waiting_.size();
     waiting_.clear();
+    known_.clear();
   }
-  scans_.push_back({scan, stamp_ns, T_odom_lidar, T_odom_lidar * antenna_lidar});
+  if (!scans_.empty()) {
+    way_m_ += (T_odom_lidar.translation() - scans_.back().T_odom_lidar.translation()).norm();
+  }
+  scans_.push_back({scan, stamp_ns, T_odom_lidar, antenna_lidar});
   if (scans_.size() > max_scans) scans_.pop_front();
 }
 
@@ -104,7 +134,7 @@ std::vector<PositionAtScan> GnssTrack::take() {
   if (scans_.empty()) return placed;
   std::deque<GnssFix> still_waiting;
   for (const GnssFix& fix : waiting_) {
-    if (fix.stamp_ns > scans_.back().stamp_ns) {
+    if (time_of(fix) > scans_.back().stamp_ns) {
       still_waiting.push_back(fix);
     } else if (auto position = between_scans(fix)) {
       placed.push_back(*std::move(position));
@@ -117,20 +147,71 @@ std::vector<PositionAtScan> GnssTrack::take() {
   return placed;
 }
 
+bool GnssTrack::judge_delay(bool is_end) {
+  if (config_.delay_s || !enu_ || (!is_end && way_m_ < next_judged_m_)) return false;
+  next_judged_m_ = way_m_ + std::max(judged_way_m, judged_share_of_way * way_m_);
+  auto found = estimated_delay();
+  if (!found) return false;
+  // What may be none is none.
+  if (std::abs(found->delay_s) < std::max(min_delay_s, sigmas_of_another * found->sigma_s))
+    found->delay_s = 0.0;
+  if (found->antenna_lidar.norm() <
+      std::max(min_antenna_m, sigmas_of_another * found->antenna_sigma_m))
+    found->antenna_lidar.setZero();
+  const auto is_another = [](double by, double least, double sigma, bool is_known) {
+    return by > std::max(least, (is_known ? sigmas_of_better : sigmas_of_another) * sigma);
+  };
+  const bool is_other_delay = is_another(std::abs(found->delay_s - delay_.delay_s), min_delay_s,
+                                         found->sigma_s, delay_.delay_s != 0.0);
+  const bool is_other_antenna =
+      is_another((found->antenna_lidar - delay_.antenna_lidar).norm(), min_antenna_m,
+                 found->antenna_sigma_m, !delay_.antenna_lidar.isZero());
+  if (!is_other_delay && !is_other_antenna) return false;
+  delay_ = *found;
+  waiting_ = known_;
+  placed_ = misplaced_ = 0;
+  return true;
+}
+
+std::optional<GnssDelay> GnssTrack::estimated_delay() const {
+  std::vector<PlanPose> way;
+  for (const ScanPose& scan : scans_) {
+    way.push_back({scan.stamp_ns, (scan.T_odom_lidar * scan.antenna_lidar).head<2>(),
+                   scan.T_odom_lidar.linear().topLeftCorner<2, 2>()});
+  }
+  std::vector<PlanFix> fixes;
+  for (const GnssFix& fix : known_) {
+    fixes.push_back({fix.stamp_ns, enu_->position_enu(fix).head<2>(), horizontal_sigma_m(fix)});
+  }
+  std::ranges::stable_sort(fixes, {}, &PlanFix::stamp_ns);
+  return estimate_delay(way, fixes, {.antenna_sigma_m = config_.antenna_sigma_m});
+}
+
+std::int64_t GnssTrack::time_of(const GnssFix& fix) const {
+  return fix.stamp_ns - std::llround(delay_.delay_s * 1e9);
+}
+
+Eigen::Vector3d GnssTrack::antenna_odom(const ScanPose& scan) const {
+  Eigen::Vector3d antenna_lidar = scan.antenna_lidar;
+  antenna_lidar.head<2>() += delay_.antenna_lidar;
+  return scan.T_odom_lidar * antenna_lidar;
+}
+
 std::optional<PositionAtScan> GnssTrack::between_scans(const GnssFix& fix) const {
-  const auto after = std::ranges::lower_bound(scans_, fix.stamp_ns, {}, &ScanPose::stamp_ns);
+  const std::int64_t time_ns = time_of(fix);
+  const auto after = std::ranges::lower_bound(scans_, time_ns, {}, &ScanPose::stamp_ns);
   if (after == scans_.end()) return std::nullopt;
-  Eigen::Vector3d antenna_odom = after->antenna_odom;
-  if (after->stamp_ns != fix.stamp_ns) {
+  Eigen::Vector3d place_odom = antenna_odom(*after);
+  if (after->stamp_ns != time_ns) {
     if (after == scans_.begin()) return std::nullopt;
     const ScanPose& before = *std::prev(after);
     const std::int64_t gap_ns = after->stamp_ns - before.stamp_ns;
-    const Eigen::Vector3d way_odom = after->antenna_odom - before.antenna_odom;
+    const Eigen::Vector3d way_odom = place_odom - antenna_odom(before);
     if (gap_ns > max_gap_ns && way_odom.norm() > max_gap_m) return std::nullopt;
-    antenna_odom = before.antenna_odom + static_cast<double>(fix.stamp_ns - before.stamp_ns) /
-                                             static_cast<double>(gap_ns) * way_odom;
+    place_odom -=
+        static_cast<double>(after->stamp_ns - time_ns) / static_cast<double>(gap_ns) * way_odom;
   }
-  return PositionAtScan{after->scan, after->T_odom_lidar.inverse() * antenna_odom,
+  return PositionAtScan{after->scan, after->T_odom_lidar.inverse() * place_odom,
                         enu_->position_enu(fix), fix.covariance_enu};
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/geodesy/east_north_up.hpp"
+#include "core/geodesy/gnss_delay.hpp"
 #include "core/geodesy/gnss_fix.hpp"
 
 namespace stillmap {
@@ -21,6 +22,13 @@ struct GnssConfig {
   double max_sigma_m = 20.0;
   /// None is believed to be better than this along any axis [m].
   double min_sigma_m = 0.02;
+  /// Of where the antenna is, along x and y of the lidar; 0: it is where it is said to be [m].
+  double antenna_sigma_m = 0.0;
+  /// How late the stamps are [s]; nothing: that is to be found out.
+  std::optional<double> delay_s;
+
+  /// Of a receiver that is somewhere on the robot.
+  void expect_antenna_anywhere() { min_sigma_m = antenna_sigma_m = size_of_robot_m; }
 };
 
 /// A fix, by the scan after it.
@@ -37,10 +45,12 @@ struct PositionAtScan {
 /// Puts the fixes of a receiver on the robot between the scans around them. Fixes and scans come in
 /// their own order, each after the other or before it, by one clock. The first fix is the origin of
 /// the positions, unless more than so many that follow it (and five at least) lie together more
-/// than 50 km from it: the first of those is, then. NOT thread safe.
+/// than 50 km from it: the first of those is, then. Stamps that are late, or of GPS time, do not
+/// fit the way by odometry, and how late they are is found out from that. NOT thread safe.
 class GnssTrack {
  public:
-  explicit GnssTrack(const GnssConfig& config) : config_(config) {}
+  explicit GnssTrack(const GnssConfig& config)
+      : config_(config), delay_{.delay_s = config.delay_s.value_or(0.0)} {}
 
   /// Returns why it is not used; empty where it is.
   [[nodiscard]] std::string add(const GnssFix& fix);
@@ -50,6 +60,12 @@ class GnssTrack {
                 const Eigen::Vector3d& antenna_lidar);
   /// Fixes that lie between two scans now; each once.
   [[nodiscard]] std::vector<PositionAtScan> take();
+  /// Finds out how late the stamps are, now and then as the way grows; `is_end`: of all of it.
+  /// Returns whether that is another delay, or another antenna, than until now: then the positions
+  /// that were taken before mean nothing any more, and take() has all of them again.
+  [[nodiscard]] bool judge_delay(bool is_end = false);
+  /// Found out until now.
+  [[nodiscard]] const GnssDelay& delay() const { return delay_; }
 
   /// The frame of the positions; nothing before the first fix.
   [[nodiscard]] const std::optional<EastNorthUp>& enu() const { return enu_; }
@@ -66,13 +82,19 @@ class GnssTrack {
     std::size_t scan = 0;
     std::int64_t stamp_ns = 0;
     Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
-    Eigen::Vector3d antenna_odom = Eigen::Vector3d::Zero();
+    Eigen::Vector3d antenna_lidar = Eigen::Vector3d::Zero();
   };
+  [[nodiscard]] Eigen::Vector3d antenna_odom(const ScanPose& scan) const;
   /// Finds another origin where fixes say that they are of another place.
   void judge_origin(const GnssFix& fix);
   /// Drops what waits of other places.
   void begin_at(const GnssFix& fix);
+  /// Keeps it for another delay.
+  void remember(const GnssFix& fix);
+  [[nodiscard]] std::optional<GnssDelay> estimated_delay() const;
   [[nodiscard]] std::optional<PositionAtScan> between_scans(const GnssFix& fix) const;
+  /// When the robot was there.
+  [[nodiscard]] std::int64_t time_of(const GnssFix& fix) const;
 
   GnssConfig config_;
   std::optional<EastNorthUp> enu_;
@@ -85,8 +107,14 @@ class GnssTrack {
   GnssFix first_stray_;
   GnssFix last_stray_;
   std::deque<GnssFix> waiting_;
+  /// The newest of all, those of a robot that stands one a second.
+  std::deque<GnssFix> known_;
   /// The newest.
   std::deque<ScanPose> scans_;
+  GnssDelay delay_;
+  /// Way of the lidar, and where the delay is judged next [m].
+  double way_m_ = 0.0;
+  double next_judged_m_ = 100.0;
   std::size_t placed_ = 0;
   std::size_t misplaced_ = 0;
 };

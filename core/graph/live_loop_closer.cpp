@@ -8,7 +8,7 @@ namespace stillmap {
 std::string LiveLoopCloser::add(const GnssFix& fix) {
   const std::size_t origins = gnss_.origins();
   std::string refusal = gnss_.add(fix);
-  if (gnss_.origins() != origins) closer_.forget_positions();
+  if (gnss_.origins() != origins) closer_.replace_positions({});
   return refusal;
 }
 
@@ -24,6 +24,8 @@ std::optional<MapCorrection> LiveLoopCloser::add(const LabelledScan& scan,
     return std::nullopt;
   }
   if (!has_moved(T_odom_lidar)) return std::nullopt;
+  const bool is_replaced = gnss_.judge_delay();
+  if (is_replaced) closer_.replace_positions(gnss_.take());
   stamps_ns_.push_back(stamp_ns);
   T_odom_lidar_last_ = T_odom_lidar;
   T_map_lidar_.push_back(T_map_odom_ * T_odom_lidar);
@@ -32,7 +34,7 @@ std::optional<MapCorrection> LiveLoopCloser::add(const LabelledScan& scan,
   }
   closer_.add(scan, T_odom_lidar, is_confirmed);
   for (const PositionAtScan& position : gnss_.take()) closer_.add(position);
-  if (closer_.submaps().size() == known_submaps_) return std::nullopt;
+  if (closer_.submaps().size() == known_submaps_ && !is_replaced) return std::nullopt;
   known_submaps_ = closer_.submaps().size();
   auto found = correction();
   if (closer_.submap_bytes() > config_.max_submap_bytes) {

@@ -61,6 +61,8 @@ class LiveLoopCloser {
     return closer_.position_counts();
   }
 
+  [[nodiscard]] bool are_positions_refused() const { return closer_.are_positions_refused(); }
+
   /// The next scan of the map, by a pose that no correction moved, with the place of the receiver's
   /// antenna on its lidar. A correction is of the map as
   /// the corrections before have left it, and is taken to be carried out.

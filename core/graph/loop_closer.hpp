@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <deque>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -56,6 +57,10 @@ struct LoopClosingConfig {
   double max_squared_position_error = 25.0;
   /// More than this share of them are not reflections: odometry is worse than it says.
   double max_doubted_share = 0.25;
+  /// Where more than this share are in doubt in the end, none is used, until there are so many
+  /// times as many: fixes are of another time, or of another drive.
+  double max_unused_share = 0.5;
+  double more_positions = 1.25;
   EarthAlignmentConfig earth;
   /// See LoopCloser::is_off_earlier_map [m].
   double max_way_off_m = 60.0;
@@ -119,8 +124,8 @@ class LoopCloser {
   }
   /// A position of one of the scans added so far. Those of scans before the first node say nothing.
   void add(const PositionAtScan& position);
-  /// Those until now were about another origin than those that follow.
-  void forget_positions();
+  /// Instead of those until now, which were of another origin or at other times.
+  void replace_positions(std::span<const PositionAtScan> positions);
   /// The drive ended: its last stretch becomes a submap, too.
   void finish();
 
@@ -140,6 +145,8 @@ class LoopCloser {
     std::size_t in_doubt = 0;
   };
   [[nodiscard]] PositionCounts position_counts() const;
+  /// Whether too many of them contradict odometry for any to be used.
+  [[nodiscard]] bool are_positions_refused() const { return refused_positions_ > 0; }
   /// Poses of all scans added so far, corrected. Without closures and positions: as they were.
   [[nodiscard]] std::vector<Eigen::Isometry3d> corrected_poses() const;
   /// The same with these poses of the graph's nodes, in whatever frame they are.
@@ -215,6 +222,10 @@ class LoopCloser {
   void use_positions();
   /// Of those in the graph.
   [[nodiscard]] std::size_t positions_in_doubt() const;
+  /// More than this share of them.
+  [[nodiscard]] bool are_too_many_in_doubt(double share) const;
+  /// Without those of the graph, until there are many more.
+  void refuse_positions();
   /// Without those of the graph, of which it knew where the map lies.
   void drop_positions();
   /// Poses of the nodes, and where the map lies.
@@ -253,6 +264,8 @@ class LoopCloser {
   std::optional<Eigen::Isometry3d> T_enu_map_;
   /// Positions that were in doubt when the graph was last placed by all of them.
   std::optional<std::size_t> settled_doubts_;
+  /// So many there were when too many of them were in doubt.
+  std::size_t refused_positions_ = 0;
 };
 
 }  // namespace stillmap

@@ -44,7 +44,7 @@ std::vector<GnssFix> simulated_gnss(const Simulation& simulation, const GnssErro
                                     errors.noise_share * errors.wander_m * random_vector(random);
     if (time_s < reflection_ends_s) position_city += reflection_city;
     GnssFix fix = city.fix_at(position_city);
-    fix.stamp_ns = std::llround(time_s * 1e9);
+    fix.stamp_ns = std::llround((time_s + errors.delay_s) * 1e9);
     fix.covariance_enu = (errors.wander_m * shape).cwiseAbs2().asDiagonal();
     fixes.push_back(fix);
   }

@@ -22,6 +22,8 @@ struct GnssErrors {
   double reflections_an_hour = 40.0;
   double reflection_s = 6.0;
   double reflection_factor = 8.0;
+  /// Of the stamps: so much later than the lidar was there [s].
+  double delay_s = 0.0;
 };
 
 /// Where every city lies: its origin, x east.

@@ -199,6 +199,7 @@ void LoopCorrector::close(const ScanOfMap& scan, bool enters) {
     closer_.emplace(closer_for(scan.run));
     reported_ = reported_anchors_ = reported_placed_ = reported_misplaced_ = handed_on_submaps_ = 0;
     reported_doubted_ = 0;
+    reported_delay_s_ = config_.gnss.delay_s.value_or(0.0);
     had_place_ = false;
   }
   const auto began = std::chrono::steady_clock::now();
@@ -294,6 +295,20 @@ void LoopCorrector::report_fixes() {
   count_new("gnss_fixes", gnss.placed(), reported_placed_);
   count_new("gnss_fixes_between_no_scans", gnss.misplaced(), reported_misplaced_);
   count_new("gnss_positions_doubted", closer_->position_counts().in_doubt, reported_doubted_);
+  const double delay_s = gnss.delay().delay_s;
+  if (std::exchange(reported_delay_s_, delay_s) != delay_s) {
+    spdlog::warn(
+        "GNSS: the stamps of the fixes are taken to be {:.3f} s late, since they fit the way so "
+        "(gnss.time_offset_s)",
+        delay_s);
+  }
+  const bool are_refused = closer_->are_positions_refused();
+  if (std::exchange(were_refused_, are_refused) == are_refused) return;
+  const char* const why =
+      "GNSS: the fixes are not used, since most of them contradict what odometry says of the way: "
+      "stamps by another clock (gnss.time_offset_s), or a receiver that is not on this robot?";
+  if (are_refused) spdlog::warn(why);
+  statistics_.set_input_fault("gnss", are_refused ? why : "");
 }
 
 void LoopCorrector::count_new(const char* counter, std::size_t now, std::size_t& reported) {

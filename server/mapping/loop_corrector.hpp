@@ -190,6 +190,8 @@ class LoopCorrector {
   std::size_t reported_placed_ = 0;
   std::size_t reported_misplaced_ = 0;
   std::size_t reported_doubted_ = 0;
+  double reported_delay_s_ = 0.0;
+  bool were_refused_ = false;
   std::size_t handed_on_submaps_ = 0;
   ThrottledLog throttled_log_;
 

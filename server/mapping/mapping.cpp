@@ -9,7 +9,8 @@ LiveLoopConfig live_loops(const ServerConfig& config) {
   LiveLoopConfig loops;
   loops.min_shift_m = 0.5 * config.mapper.static_map.voxel_size_m;
   loops.gnss.max_sigma_m = config.gnss.max_sigma_m;
-  if (!config.gnss.antenna_base) loops.gnss.min_sigma_m = GnssConfig::size_of_robot_m;
+  loops.gnss.delay_s = config.gnss.time_offset_s;
+  if (!config.gnss.antenna_base) loops.gnss.expect_antenna_anywhere();
   return loops;
 }
 

@@ -130,6 +130,19 @@ void Statistics::set_maps_left(const std::string& text) {
   maps_left_ = text;
 }
 
+void Statistics::set_input_fault(const std::string& input, const std::string& why) {
+  const std::scoped_lock lock(mutex_);
+  input_faults_[input] = why;
+}
+
+std::string Statistics::input_faults() const {
+  const std::scoped_lock lock(mutex_);
+  std::string all;
+  for (const auto& [input, why] : input_faults_)
+    if (!why.empty()) all += (all.empty() ? "" : "; ") + why;
+  return all;
+}
+
 void Statistics::set_sensor(const std::string& name) {
   const std::scoped_lock lock(mutex_);
   sensor_ = name;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -61,6 +62,11 @@ class Statistics {
   void set_map_displaced(const std::string& text);
   /// Told there, too: what killed servers left of maps, in words. Empty: nothing.
   void set_maps_left(const std::string& text);
+
+  /// Why an input that helps the lidar ("gnss", "odometry prior") is of no use; empty: it is.
+  void set_input_fault(const std::string& input, const std::string& why);
+  /// All of them.
+  [[nodiscard]] std::string input_faults() const;
 
   /// The lidar that scans are taken to come from; empty until its scans have told it.
   void set_sensor(const std::string& name);
@@ -126,6 +132,7 @@ class Statistics {
   std::string maps_left_;
   std::string sensor_;
   std::string place_search_;
+  std::map<std::string, std::string> input_faults_;
 };
 
 }  // namespace stillmap::server

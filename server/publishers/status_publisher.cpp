@@ -178,6 +178,7 @@ std::string ServerReport::mapping_fault(const dds::ServerStatus& status) const {
   }
   if (status.received_hz == 0.0) return "no scan for the last seconds";
   if (const std::string pace = reduced_pace(status.segmentation); !pace.empty()) return pace;
+  if (const std::string faults = statistics_.input_faults(); !faults.empty()) return faults;
   return status.diagnostics.empty() ? std::string() : status.diagnostics.front().what;
 }
 

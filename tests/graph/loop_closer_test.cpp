@@ -375,7 +375,7 @@ TEST(LoopCloser, PositionsAboutAnotherOriginAreForgotten) {
   const Drive arc = drive(world, 0.3 * StreetWorld::length_m, 0.0003, 0.005);
   LoopCloser closer = closed_with_fixes(world, arc, 0.05);
   ASSERT_TRUE(closer.T_enu_map());
-  closer.forget_positions();
+  closer.replace_positions({});
   EXPECT_FALSE(closer.T_enu_map());
   EXPECT_FALSE(closer.is_corrected());
   EXPECT_EQ(closer.position_counts().used, 0U);
@@ -383,6 +383,30 @@ TEST(LoopCloser, PositionsAboutAnotherOriginAreForgotten) {
   const auto last = arc.odometry.size() - 1;
   EXPECT_LT((bent_back[last].translation() - arc.odometry[last].translation()).norm(), 0.05);
   EXPECT_TRUE(closer.corrected_poses()[last].isApprox(arc.odometry[last], 0.0));
+}
+
+// Of another time, or of another drive.
+TEST(LoopCloser, PositionsThatMostlyContradictOdometryAreNotUsed) {
+  const StreetWorld world(12);
+  const Drive arc = drive(world, 0.6 * StreetWorld::length_m, 0.0003, 0.005);
+  LoopCloser closer(LoopClosingConfig{});
+  const Eigen::Isometry3d T_map_first = world.T_map_lidar_at(0.0, false);
+  for (std::size_t i = 0; i < arc.truth.size(); ++i) {
+    closer.add(world.scan_at(T_map_first * arc.truth[i], i), arc.odometry[i], true);
+    // The steps are as long as the drive's, but lead from side to side.
+    Eigen::Vector3d elsewhere = arc.truth[i].translation();
+    elsewhere.y() = std::abs(std::fmod(elsewhere.x(), 40.0));
+    closer.add({.scan = i,
+                .antenna_lidar = Eigen::Vector3d::Zero(),
+                .position_enu = T_enu_map_true * elsewhere,
+                .covariance_enu = 1e-4 * Eigen::Matrix3d::Identity()});
+  }
+  closer.finish();
+  EXPECT_TRUE(closer.are_positions_refused());
+  EXPECT_FALSE(closer.T_enu_map());
+  EXPECT_FALSE(closer.is_corrected());
+  EXPECT_GT(closer.position_counts().in_doubt, 0U);
+  EXPECT_EQ(closer.position_counts().in_doubt, closer.position_counts().used);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "core/dataset/dataset_error.hpp"
@@ -91,22 +92,31 @@ void LoopCorrection::close(std::size_t place, const LabelledScan& scan, bool ent
   enters_.push_back(enters);
   const std::int64_t stamp_ns = scan.scan.stamp_ns;
   const Eigen::Isometry3d& T_odom_lidar = T_odom_lidar_[place];
+  if (gnss_.judge_delay()) closer_.replace_positions(gnss_.take());
   closer_.add(scan, T_odom_lidar, enters, index_[place]);
-  for (; next_fix_ < fixes_.size() && fixes_[next_fix_].stamp_ns <= stamp_ns; ++next_fix_) {
-    const std::size_t origins = gnss_.origins();
-    const std::string refusal = gnss_.add(fixes_[next_fix_]);
-    if (gnss_.origins() != origins) closer_.forget_positions();
-    if (refusal.empty()) continue;
-    if (refused_fixes_++ == 0) refusal_ = refusal;
-  }
+  add_fixes(stamp_ns);
   if (!enters) return;
   gnss_.add_scan(place, stamp_ns, T_odom_lidar, antenna_lidar_);
   for (const PositionAtScan& position : gnss_.take()) closer_.add(position);
 }
 
+void LoopCorrection::add_fixes(std::int64_t until_ns) {
+  for (; next_fix_ < fixes_.size() && fixes_[next_fix_].stamp_ns <= until_ns; ++next_fix_) {
+    const std::size_t origins = gnss_.origins();
+    const std::string refusal = gnss_.add(fixes_[next_fix_]);
+    if (gnss_.origins() != origins) closer_.replace_positions({});
+    if (refusal.empty()) continue;
+    if (refused_fixes_++ == 0) refusal_ = refusal;
+  }
+}
+
 bool LoopCorrection::finish() {
   const Timed timed(seconds_);
   close_waiting(MapEntry::stays_out_with_waiting);
+  // Stamps may be late: the last ones belong to scans before them.
+  add_fixes(std::numeric_limits<std::int64_t>::max());
+  if (gnss_.judge_delay(true)) closer_.replace_positions({});
+  for (const PositionAtScan& position : gnss_.take()) closer_.add(position);
   closer_.finish();
   T_map_lidar_ = closer_.corrected_poses();
   return closer_.is_corrected();
@@ -140,6 +150,8 @@ GnssReport LoopCorrection::gnss_report() const {
                     .refused = refused_fixes_,
                     .placed = gnss_.placed(),
                     .positions = closer_.position_counts(),
+                    .are_refused = closer_.are_positions_refused(),
+                    .delay = gnss_.delay(),
                     .datum = std::nullopt};
   if (const auto& T_enu_map = closer_.T_enu_map()) {
     report.datum = gnss_.enu()->datum_of(*T_enu_map);

@@ -29,6 +29,10 @@ struct GnssReport {
   /// Put between scans; of these in the graph; of these in doubt.
   std::size_t placed = 0;
   LoopCloser::PositionCounts positions;
+  /// Too many contradict odometry: none corrects the map.
+  bool are_refused = false;
+  /// Of the stamps, and what the antenna is off; as found out, or configured.
+  GnssDelay delay;
   /// Where the map's frame lies; nothing where that did not become known.
   std::optional<Datum> datum;
   /// What the map's z axis is off the vertical [rad].
@@ -108,6 +112,8 @@ class LoopCorrection {
            MapEntry entry);
   /// Hands those to the closer that have waited for this entry.
   void close_waiting(MapEntry entry);
+  /// Those with stamps until then.
+  void add_fixes(std::int64_t until_ns);
   /// Hands a scan to the closer, with the fixes until then.
   void close(std::size_t place, const LabelledScan& scan, bool enters);
   [[nodiscard]] GnssReport gnss_report() const;

@@ -266,6 +266,7 @@ GnssOptions gnss_options(const MapArguments& arguments, const ScanDataset& datas
     receiver.antenna_base = Eigen::Map<const Eigen::Vector3d>(arguments.antenna.data());
   GnssOptions options;
   options.config.max_sigma_m = receiver.max_sigma_m;
+  options.config.delay_s = receiver.time_offset_s;
   if (receiver.antenna_base) {
     // Eigen's maxCoeff may step over NaN.
     constexpr double largest_m = 1000.0;
@@ -274,7 +275,7 @@ GnssOptions gnss_options(const MapArguments& arguments, const ScanDataset& datas
       throw std::invalid_argument("--antenna needs finite numbers: x,y,z in metres");
     options.antenna_lidar = body.T_body_lidar.inverse() * *receiver.antenna_base;
   } else {
-    options.config.min_sigma_m = GnssConfig::size_of_robot_m;
+    options.config.expect_antenna_anywhere();
   }
   if (is_used) options.fixes = dataset.gnss();
   return options;

@@ -99,6 +99,9 @@ Json to_json(const GnssReport& gnss) {
           {"between_scans", gnss.placed},
           {"in_graph", gnss.positions.used},
           {"in_doubt", gnss.positions.in_doubt},
+          {"contradict_odometry", gnss.are_refused},
+          {"time_offset_s", gnss.delay.delay_s},
+          {"antenna_offset_m", {gnss.delay.antenna_lidar.x(), gnss.delay.antenna_lidar.y()}},
           {"datum", gnss.datum ? Json(to_text(*gnss.datum)) : Json(nullptr)},
           {"tilt_deg", gnss.tilt_rad * 180.0 / std::numbers::pi}};
 }
@@ -120,6 +123,14 @@ std::string describe(const GnssReport& gnss) {
                      " fixes lie between scans";
   if (gnss.refused > 0)
     text += ", " + std::to_string(gnss.refused) + " were refused (" + gnss.refusal + ")";
+  if (gnss.delay.delay_s != 0.0) {
+    text += ", their stamps are taken to be late by " + std::to_string(gnss.delay.delay_s) + " s";
+  }
+  if (gnss.are_refused) {
+    return text +
+           "; most contradict what odometry says of the way, and none corrects the map: stamps by "
+           "another clock (gnss.time_offset_s), or another drive's fixes?\n";
+  }
   if (!gnss.datum) return text + "; they do not tell yet where the map lies\n";
   return text + ", " + std::to_string(gnss.positions.used) + " correct the map, " +
          std::to_string(gnss.positions.in_doubt) + " of these in doubt; the map's datum is " +

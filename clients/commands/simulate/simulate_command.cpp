@@ -24,6 +24,8 @@ struct SimulateArguments {
   bool imu = false;
   /// Wander of the receiver [m]; 0: none.
   double gnss_m = 0.0;
+  /// So much later than it was there are its stamps [s].
+  double gnss_delay_s = 0.0;
   bool json = false;
 };
 
@@ -42,7 +44,9 @@ Written write_sequence(const SimulateArguments& arguments, const simulation::Sim
   save_sensor(simulation.config().sensor, folder / "sensor.yaml");
   if (arguments.imu) write_imu_csv(folder / "imu.csv", simulated_imu(simulation));
   if (arguments.gnss_m > 0.0) {
-    write_gnss_csv(folder / "gnss.csv", simulated_gnss(simulation, {.wander_m = arguments.gnss_m}));
+    const simulation::GnssErrors errors{.wander_m = arguments.gnss_m,
+                                        .delay_s = arguments.gnss_delay_s};
+    write_gnss_csv(folder / "gnss.csv", simulated_gnss(simulation, errors));
   }
   const int scans = simulation.config().scans;
   Progress progress("simulate", "scans", static_cast<std::uint64_t>(scans));
@@ -134,6 +138,12 @@ void add_simulate_command(CommandHandle program, Action& action) {
               "Write gnss.csv, too: an antenna at the lidar, 5 Hz, that errs by so many metres for "
               "a minute, and by more beside houses (0.02: with corrections, 1.5: without)")
       .above_zero();
+  command
+      .option(
+          "--gnss-delay", arguments->gnss_delay_s,
+          "Its stamps are so many seconds late, as of a receiver that stamps what it sends when "
+          "it sends it (0.1), or that has GPS time (18)")
+      .with_default();
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"

@@ -1,0 +1,322 @@
+#include "core/geodesy/gnss_delay.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+namespace stillmap {
+namespace {
+
+using Matrix23 = Eigen::Matrix<double, 2, 3>;
+
+/// Between scans that are farther apart than both nobody knows where the antenna was.
+constexpr std::int64_t max_gap_ns = 1'500'000'000;
+constexpr double max_gap_m = 0.5;
+/// Of a stretch: long enough for a turn, short enough for odometry not to drift [m].
+constexpr double min_stretch_m = 100.0;
+constexpr std::size_t min_stretch_fixes = 12;
+/// Fixes of a stretch lie so far apart at least, and so many standard deviations [m].
+constexpr double min_spacing_m = 1.0;
+constexpr double spacing_sigmas = 1.0;
+/// Where a robot stands tells as much as where it drives, but not more the longer it does.
+constexpr std::int64_t standing_apart_ns = 1'000'000'000;
+constexpr int max_standing = 5;
+/// Where the kernel begins to take a fix for a reflection: odometry errs, too [m].
+constexpr double min_kernel_m = 0.3;
+constexpr double coarse_step_s = 0.5;
+constexpr double fine_step_s = 0.05;
+/// Errors of so many neighbouring fixes are the same.
+constexpr double correlated_fixes = 10.0;
+/// Of a delay of seconds, in all and as a share of what there is to gain.
+constexpr double min_gain = 5.0;
+constexpr double min_gain_share = 0.1;
+/// One stretch alone could be a fault of the receiver.
+constexpr double min_stretches = 2.0;
+
+/// Of the way at one time.
+struct Place {
+  Eigen::Vector2d antenna_odom = Eigen::Vector2d::Zero();
+  Eigen::Vector2d velocity_odom = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d axes_odom = Eigen::Matrix2d::Identity();
+  bool is_known = false;
+};
+
+/// Where one stretch of the way lies, and how well that fits.
+struct StretchFit {
+  Eigen::Matrix2d R_enu_odom = Eigen::Matrix2d::Identity();
+  Eigen::Vector2d t_enu_odom = Eigen::Vector2d::Zero();
+};
+
+Place place_at(std::span<const PlanPose> way, std::int64_t stamp_ns) {
+  const auto after = std::ranges::lower_bound(way, stamp_ns, {}, &PlanPose::stamp_ns);
+  if (after == way.end() || after == way.begin()) return {};
+  const PlanPose& before = *std::prev(after);
+  const Eigen::Vector2d step = after->antenna_odom - before.antenna_odom;
+  const std::int64_t gap_ns = after->stamp_ns - before.stamp_ns;
+  if (gap_ns > max_gap_ns && step.norm() > max_gap_m) return {};
+  const double gap_s = 1e-9 * static_cast<double>(gap_ns);
+  const double share =
+      static_cast<double>(stamp_ns - before.stamp_ns) / static_cast<double>(gap_ns);
+  return {before.antenna_odom + share * step, step / gap_s,
+          share < 0.5 ? before.axes_odom : after->axes_odom, true};
+}
+
+/// The fixes by stretches, and what is asked of them.
+class Stretches {
+ public:
+  Stretches(std::span<const PlanPose> way, std::span<const PlanFix> fixes,
+            const GnssDelayConfig& config)
+      : way_(way), config_(config) {
+    double way_m = 0.0;
+    std::size_t begun = 0;
+    int standing = 0;
+    for (const PlanFix& fix : fixes) {
+      if (!fixes_.empty()) {
+        const double step_m = (fix.position_enu - fixes_.back().position_enu).norm();
+        if (step_m < std::max(min_spacing_m, spacing_sigmas * fix.sigma_m)) {
+          if (fix.stamp_ns - fixes_.back().stamp_ns < standing_apart_ns) continue;
+          if (++standing > max_standing) continue;
+        } else {
+          standing = 0;
+          way_m += step_m;
+        }
+      }
+      fixes_.push_back(fix);
+      if (way_m < min_stretch_m || fixes_.size() - begun < min_stretch_fixes) continue;
+      ends_.push_back(fixes_.size());
+      begun = fixes_.size();
+      way_m = 0.0;
+    }
+    std::vector<double> sigmas;
+    for (const PlanFix& fix : fixes_) sigmas.push_back(fix.sigma_m);
+    kernel_m_ = min_kernel_m;
+    if (sigmas.empty()) return;
+    const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
+    std::ranges::nth_element(sigmas, middle);
+    kernel_m_ = std::max(kernel_m_, *middle);
+  }
+
+  [[nodiscard]] std::size_t size() const { return ends_.size(); }
+
+  /// Cost of each fix under the best place of its stretch; NaN of those off the way.
+  [[nodiscard]] std::vector<double> costs(double delay_s) const {
+    std::vector<double> costs(fixes_.size(), std::nan(""));
+    const auto places = places_at(delay_s);
+    for (std::size_t k = 0; k < ends_.size(); ++k) {
+      const auto stretch = fit(places, k, Eigen::Vector2d::Zero());
+      if (!stretch) continue;
+      for (std::size_t i = begin(k); i < ends_[k]; ++i) {
+        if (!places[i].is_known) continue;
+        costs[i] =
+            std::log1p(residual(*stretch, places[i], i, Eigen::Vector2d::Zero()).squaredNorm() /
+                       (kernel_m_ * kernel_m_));
+      }
+    }
+    return costs;
+  }
+
+  /// From there to the best delay, and the best antenna.
+  [[nodiscard]] std::optional<GnssDelay> refined(double delay_s) const {
+    constexpr int steps = 12;
+    constexpr double max_step_s = 0.1;
+    GnssDelay found{.delay_s = delay_s};
+    for (int step = 0; step < steps; ++step) {
+      const auto equations = normal_equations(found);
+      if (!equations) return std::nullopt;
+      const Eigen::Vector3d by = equations->solution;
+      found.delay_s += std::clamp(by[0], -max_step_s, max_step_s);
+      if (config_.antenna_sigma_m > 0.0) found.antenna_lidar += by.tail<2>();
+      found.sigma_s = equations->sigmas[0];
+      if (config_.antenna_sigma_m > 0.0) found.antenna_sigma_m = equations->sigmas.tail<2>().norm();
+    }
+    if (!(std::abs(found.delay_s - delay_s) <= 2.0 * coarse_step_s)) return std::nullopt;
+    return found;
+  }
+
+ private:
+  struct Equations {
+    Eigen::Vector3d solution = Eigen::Vector3d::Zero();
+    /// Standard deviations.
+    Eigen::Vector3d sigmas = Eigen::Vector3d::Zero();
+  };
+
+  [[nodiscard]] std::size_t begin(std::size_t stretch) const {
+    return stretch == 0 ? 0 : ends_[stretch - 1];
+  }
+
+  [[nodiscard]] std::vector<Place> places_at(double delay_s) const {
+    const std::int64_t delay_ns = std::llround(delay_s * 1e9);
+    std::vector<Place> places;
+    places.reserve(fixes_.size());
+    for (const PlanFix& fix : fixes_) places.push_back(place_at(way_, fix.stamp_ns - delay_ns));
+    return places;
+  }
+
+  [[nodiscard]] Eigen::Vector2d residual(const StretchFit& stretch, const Place& place,
+                                         std::size_t fix,
+                                         const Eigen::Vector2d& antenna_lidar) const {
+    return fixes_[fix].position_enu -
+           stretch.R_enu_odom * (place.antenna_odom + place.axes_odom * antenna_lidar) -
+           stretch.t_enu_odom;
+  }
+
+  [[nodiscard]] double weight(const Eigen::Vector2d& residual_m) const {
+    return 1.0 / (1.0 + residual_m.squaredNorm() / (kernel_m_ * kernel_m_));
+  }
+
+  /// Closed form in the plane, reweighted. Nothing where most fixes are off the way.
+  [[nodiscard]] std::optional<StretchFit> fit(const std::vector<Place>& places, std::size_t stretch,
+                                              const Eigen::Vector2d& antenna_lidar) const {
+    constexpr int iterations = 4;
+    std::vector<std::size_t> known;
+    for (std::size_t i = begin(stretch); i < ends_[stretch]; ++i)
+      if (places[i].is_known) known.push_back(i);
+    if (2 * known.size() < ends_[stretch] - begin(stretch)) return std::nullopt;
+    std::vector<double> weights(known.size(), 1.0);
+    StretchFit found;
+    for (int iteration = 0; iteration < iterations; ++iteration) {
+      Eigen::Vector2d middle_odom = Eigen::Vector2d::Zero(), middle_enu = Eigen::Vector2d::Zero();
+      double sum = 0.0, along = 0.0, across = 0.0;
+      const auto point_odom = [&](std::size_t i) -> Eigen::Vector2d {
+        return places[i].antenna_odom + places[i].axes_odom * antenna_lidar;
+      };
+      for (std::size_t k = 0; k < known.size(); ++k) {
+        middle_odom += weights[k] * point_odom(known[k]);
+        middle_enu += weights[k] * fixes_[known[k]].position_enu;
+        sum += weights[k];
+      }
+      middle_odom /= sum;
+      middle_enu /= sum;
+      for (std::size_t k = 0; k < known.size(); ++k) {
+        const Eigen::Vector2d a = point_odom(known[k]) - middle_odom;
+        const Eigen::Vector2d b = fixes_[known[k]].position_enu - middle_enu;
+        along += weights[k] * a.dot(b);
+        across += weights[k] * (a.x() * b.y() - a.y() * b.x());
+      }
+      found.R_enu_odom = Eigen::Rotation2D<double>(std::atan2(across, along)).toRotationMatrix();
+      found.t_enu_odom = middle_enu - found.R_enu_odom * middle_odom;
+      for (std::size_t k = 0; k < known.size(); ++k)
+        weights[k] = weight(residual(found, places[known[k]], known[k], antenna_lidar));
+    }
+    return found;
+  }
+
+  /// Of delay and antenna, the place of every stretch being eliminated. The delay's variance is
+  /// the larger of what the residuals and of what the differences between stretches say.
+  [[nodiscard]] std::optional<Equations> normal_equations(const GnssDelay& at) const;
+
+  std::span<const PlanPose> way_;
+  GnssDelayConfig config_;
+  std::vector<PlanFix> fixes_;
+  /// After the last fix of each stretch.
+  std::vector<std::size_t> ends_;
+  double kernel_m_ = min_kernel_m;
+};
+
+std::optional<Stretches::Equations> Stretches::normal_equations(const GnssDelay& at) const {
+  const auto places = places_at(at.delay_s);
+  std::vector<Eigen::Matrix3d> informations;
+  std::vector<Eigen::Vector3d> gradients;
+  double squared = 0.0, weights = 0.0;
+  for (std::size_t k = 0; k < ends_.size(); ++k) {
+    const auto stretch = fit(places, k, at.antenna_lidar);
+    if (!stretch) continue;
+    Eigen::Matrix3d H_own = Eigen::Matrix3d::Zero(), H_place = Eigen::Matrix3d::Zero(),
+                    H_both = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d b_own = Eigen::Vector3d::Zero(), b_place = Eigen::Vector3d::Zero();
+    for (std::size_t i = begin(k); i < ends_[k]; ++i) {
+      if (!places[i].is_known) continue;
+      const Eigen::Vector2d r = residual(*stretch, places[i], i, at.antenna_lidar);
+      const double w = weight(r);
+      const Eigen::Vector2d turned = fixes_[i].position_enu - r - stretch->t_enu_odom;
+      Matrix23 J_own, J_place;
+      J_own << -stretch->R_enu_odom * places[i].velocity_odom,
+          stretch->R_enu_odom * places[i].axes_odom;
+      J_place << Eigen::Vector2d(-turned.y(), turned.x()), Eigen::Matrix2d::Identity();
+      H_own += w * J_own.transpose() * J_own;
+      H_both += w * J_own.transpose() * J_place;
+      H_place += w * J_place.transpose() * J_place;
+      b_own += w * J_own.transpose() * r;
+      b_place += w * J_place.transpose() * r;
+      squared += w * r.squaredNorm();
+      weights += w;
+    }
+    const Eigen::Matrix3d eliminated = H_place.ldlt().solve(H_both.transpose()).transpose();
+    informations.emplace_back(H_own - eliminated * H_both.transpose());
+    gradients.emplace_back(b_own - eliminated * b_place);
+  }
+  if (informations.empty()) return std::nullopt;
+  const double variance_m2 = squared / weights;
+  Eigen::Matrix3d H =
+      std::reduce(informations.begin(), informations.end(), Eigen::Matrix3d::Zero().eval());
+  Eigen::Vector3d b =
+      std::reduce(gradients.begin(), gradients.end(), Eigen::Vector3d::Zero().eval());
+  if (config_.antenna_sigma_m > 0.0) {
+    const double prior =
+        correlated_fixes * variance_m2 / (config_.antenna_sigma_m * config_.antenna_sigma_m);
+    H.diagonal().tail<2>().array() += prior;
+    b.tail<2>() -= prior * at.antenna_lidar;
+  } else {
+    H.row(1).setZero(), H.col(1).setZero(), H.row(2).setZero(), H.col(2).setZero();
+    H(1, 1) = H(2, 2) = 1.0;
+    b.tail<2>().setZero();
+  }
+  // Too little information to divide by, as on one straight way.
+  constexpr double least_m2_per_s2 = 1e-6;
+  const Eigen::Matrix3d covariance = H.inverse();
+  if (!covariance.allFinite() || !(covariance(0, 0) * least_m2_per_s2 < 1.0)) return std::nullopt;
+  Equations equations{.solution = covariance * b};
+  Eigen::Vector3d between = Eigen::Vector3d::Zero();
+  double sum = 0.0, sum_of_squares = 0.0;
+  const Eigen::Vector3d row = covariance.row(0);
+  for (std::size_t k = 0; k < informations.size(); ++k) {
+    const Eigen::Vector3d rest = gradients[k] - informations[k] * equations.solution;
+    between += (covariance * rest).cwiseAbs2();
+    const double share = row.dot(informations[k] * row) / covariance(0, 0);
+    sum += share;
+    sum_of_squares += share * share;
+  }
+  const double stretches = sum * sum / sum_of_squares;
+  if (stretches < min_stretches) return std::nullopt;
+  const Eigen::Vector3d within = correlated_fixes * variance_m2 * covariance.diagonal();
+  equations.sigmas = (between * stretches / (stretches - 1.0)).cwiseMax(within).cwiseSqrt();
+  return equations;
+}
+
+/// What the fixes cost less by the one than by the other, of those that lie on the way by both.
+double gain(const std::vector<double>& from, const std::vector<double>& to) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < from.size(); ++i)
+    if (!std::isnan(from[i]) && !std::isnan(to[i])) sum += from[i] - to[i];
+  return sum;
+}
+
+}  // namespace
+
+std::optional<GnssDelay> estimate_delay(std::span<const PlanPose> way,
+                                        std::span<const PlanFix> fixes,
+                                        const GnssDelayConfig& config) {
+  const Stretches stretches(way, fixes, config);
+  if (stretches.size() < 2) return std::nullopt;
+  const std::vector<double> without = stretches.costs(0.0);
+  double best_s = 0.0, best_gain = 0.0;
+  const auto look_at = [&](double delay_s) {
+    const double gained = gain(without, stretches.costs(delay_s));
+    if (gained <= best_gain) return;
+    best_gain = gained;
+    best_s = delay_s;
+  };
+  const auto coarse = static_cast<int>(config.max_delay_s / coarse_step_s);
+  for (int k = -coarse; k <= coarse; ++k) look_at(k * coarse_step_s);
+  // Who drives the same round again and again fits about as well a round later.
+  const double total = gain(without, std::vector<double>(without.size(), 0.0));
+  if (best_gain < std::max(min_gain, min_gain_share * total)) best_s = best_gain = 0.0;
+  const double about_s = best_s;
+  const auto fine = static_cast<int>(coarse_step_s / fine_step_s);
+  for (int k = -fine; k <= fine; ++k) look_at(about_s + k * fine_step_s);
+  return stretches.refined(best_s);
+}
+
+}  // namespace stillmap

@@ -1,0 +1,119 @@
+#include "core/geodesy/gnss_delay.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+namespace stillmap {
+namespace {
+
+/// What a lidar and a receiver say of a drive.
+struct Heard {
+  std::vector<PlanPose> way;
+  std::vector<PlanFix> fixes;
+};
+
+/// Speed [m/s] and turn rate [rad/s] at a time.
+struct Course {
+  double (*speed_at)(double time_s);
+  double (*turn_at)(double time_s);
+};
+
+/// 10 m/s and slower in turns to either side, and a stop at every third one.
+constexpr Course town{
+    [](double s) {
+      const double phase_s = std::fmod(s, 14.0);
+      if (phase_s < 9.0) return 10.0;
+      return std::fmod(s, 42.0) > 40.0 ? 0.0 : 5.0;
+    },
+    [](double s) {
+      const double phase_s = std::fmod(s, 14.0);
+      return phase_s > 10.0 && phase_s < 13.0 ? (std::fmod(s, 70.0) < 42.0 ? 0.52 : -0.52) : 0.0;
+    }};
+constexpr Course motorway{[](double) { return 30.0; }, [](double) { return 0.0; }};
+constexpr Course roundabout{[](double) { return 8.0; }, [](double) { return 0.4; }};
+
+/// Scans at 10 Hz by odometry that turns too far, fixes at 5 Hz.
+Heard driven(const Course& course, double duration_s, double delay_s, double sigma_m,
+             const Eigen::Vector2d& antenna_lidar = {0, 0}) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0.0, sigma_m);
+  Heard heard;
+  constexpr double step_s = 0.01;
+  Eigen::Vector2d at = Eigen::Vector2d::Zero(), at_odom = at;
+  double heading_rad = 0.3, heading_odom_rad = 0.0;
+  for (int k = 0; k * step_s < duration_s; ++k) {
+    const double time_s = k * step_s;
+    const Eigen::Matrix2d axes = Eigen::Rotation2D<double>(heading_rad).toRotationMatrix();
+    const Eigen::Matrix2d axes_odom =
+        Eigen::Rotation2D<double>(heading_odom_rad).toRotationMatrix();
+    if (k % 10 == 0) heard.way.push_back({std::llround(time_s * 1e9), at_odom, axes_odom});
+    if (k % 20 == 3) {
+      const Eigen::Vector2d position = at + axes * antenna_lidar;
+      heard.fixes.push_back({std::llround((time_s + delay_s) * 1e9),
+                             position + Eigen::Vector2d(noise(random), noise(random)),
+                             std::max(sigma_m, 0.02)});
+    }
+    const double way_m = course.speed_at(time_s) * step_s;
+    at += way_m * axes.col(0);
+    at_odom += 1.001 * way_m * axes_odom.col(0);
+    heading_rad += course.turn_at(time_s) * step_s;
+    heading_odom_rad += course.turn_at(time_s) * step_s + 3e-5 * way_m;
+  }
+  return heard;
+}
+
+TEST(GnssDelay, IsFoundByTurnsAndStops) {
+  for (const double delay_s : {0.0, 0.05, 0.1, 0.3, -0.5, 18.0, -18.0}) {
+    const Heard heard = driven(town, 150.0, delay_s, 0.02);
+    const auto found = estimate_delay(heard.way, heard.fixes);
+    ASSERT_TRUE(found) << delay_s;
+    EXPECT_NEAR(found->delay_s, delay_s, 0.01);
+    EXPECT_LT(found->sigma_s, 0.01);
+    EXPECT_TRUE(found->antenna_lidar.isZero());
+  }
+}
+
+TEST(GnssDelay, IsAsSureAsItIsRight) {
+  for (const double delay_s : {0.0, 0.3, -18.0}) {
+    const Heard heard = driven(town, 300.0, delay_s, 1.5);
+    const auto found = estimate_delay(heard.way, heard.fixes);
+    ASSERT_TRUE(found) << delay_s;
+    EXPECT_LT(std::abs(found->delay_s - delay_s), 3.0 * found->sigma_s);
+    EXPECT_LT(found->sigma_s, 0.1);
+  }
+}
+
+TEST(GnssDelay, IsToldFromAnAntennaThatIsElsewhere) {
+  const Heard heard = driven(town, 300.0, 0.2, 0.02, {2.5, -0.8});
+  const auto found = estimate_delay(heard.way, heard.fixes, {.antenna_sigma_m = 1.0});
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->delay_s, 0.2, 0.02);
+  EXPECT_LT((found->antenna_lidar - Eigen::Vector2d(2.5, -0.8)).norm(), 0.1);
+  EXPECT_LT(found->antenna_sigma_m, 0.1);
+}
+
+// There a delay is another place of the map.
+TEST(GnssDelay, IsNotKnownWhereSpeedAndTurnAreTheSameAllTheTime) {
+  for (const Course& course : {motorway, roundabout}) {
+    for (const double delay_s : {0.0, 0.5}) {
+      const Heard heard = driven(course, 120.0, delay_s, 0.02);
+      const auto found = estimate_delay(heard.way, heard.fixes);
+      EXPECT_TRUE(!found || std::abs(found->delay_s) < 4.0 * found->sigma_s);
+    }
+  }
+}
+
+TEST(GnssDelay, NothingTellsNothing) {
+  EXPECT_FALSE(estimate_delay({}, {}));
+  const Heard heard = driven(town, 5.0, 0.1, 0.02);
+  EXPECT_FALSE(estimate_delay(heard.way, heard.fixes));
+  EXPECT_FALSE(estimate_delay({}, driven(town, 60.0, 0.1, 0.02).fixes));
+}
+
+}  // namespace
+}  // namespace stillmap
