@@ -355,6 +355,8 @@ DatasetFrame ScanDataset::read_as_recorded(std::size_t i) const {
   }
   DatasetFrame frame;
   frame.scan = read_bin(file(i), bin_layout_);
+  if (bin_layout_ == BinLayout::nuscenes)
+    frame.format = "intensity (0 to 255) and ring as nuScenes' files have them, no time";
   frame.scan.stamp_ns = stamp_ns(i);
   const std::size_t points = frame.scan.size();
   if (const auto labels = beside(i, "labels", ".label"); fs::exists(labels)) {

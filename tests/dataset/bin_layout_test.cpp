@@ -95,6 +95,8 @@ TEST_F(BinLayoutTest, ReadsNuscenesWithItsRings) {
     ASSERT_EQ(scan.ring[i], static_cast<std::uint16_t>(points[i].ring));
   }
   EXPECT_EQ(dataset.suggested_sensor().rings, 32);
+  EXPECT_EQ(dataset.stamp_ns(0), 1532402927647951000);
+  EXPECT_THAT(dataset.remarks(), testing::ElementsAre(HasSubstr("nuScenes")));
   // Whatever the file is called.
   EXPECT_EQ(ScanDataset(write(values_of(points, 5))).read(0).scan.ring, scan.ring);
 }
