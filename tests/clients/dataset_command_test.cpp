@@ -393,5 +393,20 @@ TEST_F(DatasetCommandTest, SensorIsNotNamedFromScansWithoutPoints) {
   EXPECT_FALSE(exists("lidar.yaml"));
 }
 
+TEST_F(DatasetCommandTest, ReadsTheFieldsThatTheServersFileNames) {
+  write("a.ply",
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+        "property float z\nproperty float intensity\nproperty uchar brightness\nend_header\n"
+        "5 0 0 0.25 0\n0 6 0 0.5 255\n");
+  write("server.yaml", "input: {fields: {intensity: [brightness]}}\n");
+  const std::string to_copy =
+      "dataset export " + path("a.ply") + " " + path("copy") + " --labels none --force";
+  EXPECT_THAT(run(to_copy).err, HasSubstr("intensity from intensity (float32), no time"));
+  EXPECT_FLOAT_EQ(ScanDataset(path("copy")).read(0).scan.intensity.at(0), 0.25F);
+  EXPECT_THAT(run(to_copy + " --config " + path("server.yaml")).err,
+              HasSubstr("intensity from brightness (uint8)"));
+  EXPECT_FLOAT_EQ(ScanDataset(path("copy")).read(0).scan.intensity.at(0), 0.0F);
+}
+
 }  // namespace
 }  // namespace stillmap::test
