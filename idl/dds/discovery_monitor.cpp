@@ -10,6 +10,8 @@
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <sstream>
 
+#include "idl/dds/shown_text.hpp"
+
 namespace stillmap::dds {
 namespace {
 
@@ -25,6 +27,9 @@ std::string streamed(const T& value) {
   text << value;
   return text.str();
 }
+
+/// Anybody may announce anything. Names of DDS and ROS 2 have up to 255 bytes.
+std::string shown(std::string_view text) { return shown_text(text, 255); }
 
 std::string vendor_name(const VendorId_t& vendor) {
   struct Named {
@@ -42,7 +47,7 @@ std::string vendor_name(const VendorId_t& vendor) {
 
 std::string property(const ParticipantProxyData& data, const std::string& name) {
   for (const auto& pair : data.m_properties) {
-    if (pair.first() == name) return pair.second();
+    if (pair.first() == name) return shown(pair.second());
   }
   return {};
 }
@@ -82,7 +87,7 @@ RemoteParticipant remote_participant_from(const ParticipantProxyData& data,
                                           const GuidPrefix_t& ours) {
   RemoteParticipant peer;
   peer.guid = streamed(data.m_guid.guidPrefix);
-  peer.name = data.m_participantName.to_string();
+  peer.name = shown(data.m_participantName.to_string());
   peer.vendor = vendor_name(data.m_VendorId);
   peer.host = property(data, eprosima::fastdds::dds::parameter_policy_physical_data_host);
   peer.user = property(data, eprosima::fastdds::dds::parameter_policy_physical_data_user);
@@ -110,7 +115,7 @@ EndpointQos qos_from(const Qos& qos) {
                   .exclusive_ownership = qos.m_ownership.kind == EXCLUSIVE_OWNERSHIP_QOS,
                   .partitions = {}};
   for (auto it = qos.m_partition.begin(); it != qos.m_partition.end(); ++it) {
-    out.partitions.emplace_back(it->name());
+    out.partitions.push_back(shown(it->name()));
   }
   return out;
 }
@@ -127,8 +132,8 @@ std::string user_data_of(const ProxyData& data) {
 template <typename ProxyData>
 Endpoint endpoint_from(ProxyData& data, bool is_writer) {
   return {.guid = streamed(data.guid()),
-          .topic = data.topicName().to_string(),
-          .type = data.typeName().to_string(),
+          .topic = shown(data.topicName().to_string()),
+          .type = shown(data.typeName().to_string()),
           .is_writer = is_writer,
           .is_keyed = data.topicKind() == WITH_KEY,
           .user_data = user_data_of(data),

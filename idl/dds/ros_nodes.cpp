@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "idl/dds/ros_graph.hpp"
+#include "idl/dds/shown_text.hpp"
 #include "rmw_dds_common.h"
 #include "rmw_dds_common_iron.h"
 
@@ -16,6 +17,9 @@ constexpr int max_waiting_announcements = 1000;
 
 // A node has some 100 bytes, and 24 for each of its endpoints; in memory its names alone have 512.
 constexpr std::size_t max_announcement_bytes = 1'000'000;
+
+// Of a namespace and a node.
+constexpr std::size_t max_name_bytes = 512;
 
 /// Nothing when the bytes are a sample of another layout.
 template <typename Info>
@@ -30,8 +34,9 @@ std::vector<std::string> names_in(SerializedSample& announcement) {
   std::vector<std::string> names;
   for (const auto& node : info.node_entities_info_seq()) {
     const std::string name_space = node.node_namespace().to_string();
-    names.push_back(name_space + (name_space.ends_with('/') ? "" : "/") +
-                    node.node_name().to_string());
+    names.push_back(shown_text(
+        name_space + (name_space.ends_with('/') ? "" : "/") + node.node_name().to_string(),
+        max_name_bytes));
   }
   return names;
 }

@@ -113,6 +113,9 @@ TEST(HostileCount, OfAnAnnouncementOfNodesIsNotReadWhereItIsTooLarge) {
   SerializedSample small =
       to_bytes(type_support<rmw_dds_common::msg::ParticipantEntitiesInfo>(), &info, 0);
   EXPECT_EQ(ros_node_names(small), std::vector<std::string>{"/rviz2"});
+  info.node_entities_info_seq()[0].node_name("rviz\x1b[2J");
+  small = to_bytes(type_support<rmw_dds_common::msg::ParticipantEntitiesInfo>(), &info, 0);
+  EXPECT_EQ(ros_node_names(small), std::vector<std::string>{"/rviz?[2J"});
   // 16 bytes make a node of half a kilobyte.
   info.node_entities_info_seq().resize(70'000);
   SerializedSample large =
