@@ -90,18 +90,37 @@ dds::Diagnostic no_scans_diagnostic(const std::vector<Publisher>& found, const s
               "nothing to send, or large messages get lost on the way (UDP buffers)"};
 }
 
+constexpr const char* encoding_hint =
+    "let the publisher write classic CDR (XCDR1), as ROS 2 does, of the message as ROS 2 defines "
+    "it";
+
+/// Messages beside the clouds.
+void add_unreadable_messages(const dds::ServerStatus& status, Diagnostics& diagnostics) {
+  for (const char* const input : {"tf_static", "imu", "gnss", "odometry_prior", "initial_pose"}) {
+    const std::uint64_t count = status.counter(std::string(input) + "_unreadable");
+    if (count == 0) continue;
+    diagnostics.push_back({.severity = dds::Severity::advice,
+                           .what = "the server cannot read messages of " + std::string(input),
+                           .evidence = std::to_string(count) +
+                                       " messages; its log says what they have and who wrote them",
+                           .hint = encoding_hint});
+  }
+}
+
 void add_rejected_clouds(const dds::ServerStatus& status, Diagnostics& diagnostics) {
   const std::uint64_t received = status.counter("scans_received");
   for (const dds::NamedCounter& counter : status.counters) {
     if (counter.name != dds::bad_clouds_counter) continue;
+    const bool is_unreadable = counter.detail == dds::unreadable_cloud;
     diagnostics.push_back(
         {.severity = counter.value == received ? dds::Severity::problem : dds::Severity::advice,
          .what = "clouds are refused: " + counter.detail,
          .evidence = std::to_string(counter.value) + " of " + std::to_string(received) + " scans" +
                      (status.reason.empty() ? "" : "; " + status.reason),
-         .hint = "give the server the names of the cloud's fields (input.fields) "
-                 "and the sensor that sends it (sensor: " +
-                 status.sensor + " now)"});
+         .hint = is_unreadable ? encoding_hint
+                               : "give the server the names of the cloud's fields (input.fields) "
+                                 "and the sensor that sends it (sensor: " +
+                                     status.sensor + " now)"});
   }
 }
 
@@ -158,6 +177,7 @@ Diagnostics check_scans(const SystemSnapshot& snapshot) {
     diagnostics.push_back(no_scans_diagnostic(found, points, status.reason));
   }
   add_rejected_clouds(status, diagnostics);
+  add_unreadable_messages(status, diagnostics);
   const std::uint64_t mapped = status.counter("scans_mapped");
   if (diagnostics.empty() && mapped == 0 && status.counter("scans_received") > 0) {
     diagnostics.push_back(

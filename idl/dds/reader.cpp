@@ -1,6 +1,8 @@
 #include "idl/dds/reader.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <utility>
 
 namespace stillmap::dds {
 
@@ -103,16 +105,32 @@ bool UntypedReader::take_untyped(void* sample, SampleInfo& info, const std::stop
 }
 
 bool UntypedReader::take_next(void* sample, SampleInfo& info) {
-  // Samples without data only say that a key or a writer is gone.
-  while (reader_->take_next_sample(sample, &info) == ReturnCode::RETCODE_OK) {
-    if (info.valid_data) return true;
-  }
-  if (!best_effort_) return false;
-  // It also gets, once more, what reliable writers write.
-  while (best_effort_->reader->take_next_sample(sample, &info) == ReturnCode::RETCODE_OK) {
-    if (info.valid_data && !events_.has_writer(info.sample_identity.writer_guid())) return true;
+  if (take_next_of(*reader_, false, sample, info)) return true;
+  return best_effort_ && take_next_of(*best_effort_->reader, true, sample, info);
+}
+
+bool UntypedReader::take_next_of(DataReader& reader, bool only_new, void* sample,
+                                 SampleInfo& info) {
+  constexpr std::size_t max_unreadable = 500;
+  RefusedBytes refused;
+  while (reader.take_next_sample(sample, &info) == ReturnCode::RETCODE_OK) {
+    std::string why = refused.take_reason();
+    // Samples without data only say that a key or a writer is gone.
+    if (!info.valid_data) continue;
+    // A best-effort reader also gets, once more, what reliable writers write.
+    if (only_new && events_.has_writer(info.sample_identity.writer_guid())) continue;
+    if (why.empty()) return true;
+    unreadable_.push_back({info.sample_identity, std::move(why)});
+    if (unreadable_.size() > max_unreadable) unreadable_.pop_front();
   }
   return false;
+}
+
+std::vector<UnreadableSample> UntypedReader::take_unreadable() {
+  std::vector<UnreadableSample> taken(std::make_move_iterator(unreadable_.begin()),
+                                      std::make_move_iterator(unreadable_.end()));
+  unreadable_.clear();
+  return taken;
 }
 
 void UntypedReader::open_best_effort_when_needed() {

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <deque>
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
@@ -11,6 +12,7 @@
 #include <set>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "idl/dds/participant.hpp"
 #include "idl/dds/type_support.hpp"
@@ -58,6 +60,12 @@ class ReaderEvents : public eprosima::fastdds::dds::DataReaderListener {
   int incompatible_writers_ = 0;
 };
 
+/// A sample that was taken and is none of the topic's type.
+struct UnreadableSample {
+  eprosima::fastrtps::rtps::SampleIdentity identity;
+  std::string why;
+};
+
 /// What Reader<T> does without knowing T.
 class UntypedReader {
  public:
@@ -75,6 +83,10 @@ class UntypedReader {
   [[nodiscard]] int incompatible_writers() const;
   [[nodiscard]] eprosima::fastrtps::rtps::GUID_t guid() const { return reader_->guid(); }
 
+  /// What was passed over since the last call because it could not be read, oldest first; of a
+  /// flood, the newest hundreds. By the thread that takes.
+  [[nodiscard]] std::vector<UnreadableSample> take_unreadable();
+
  protected:
   [[nodiscard]] bool take_untyped(void* sample, eprosima::fastdds::dds::SampleInfo& info,
                                   const std::stop_token& stop, std::chrono::milliseconds timeout);
@@ -87,6 +99,9 @@ class UntypedReader {
     Participant::ReaderHandle reader;
   };
   [[nodiscard]] bool take_next(void* sample, eprosima::fastdds::dds::SampleInfo& info);
+  /// Of one of both readers; with `only_new`, not what the reliable reader gets, too.
+  [[nodiscard]] bool take_next_of(eprosima::fastdds::dds::DataReader& reader, bool only_new,
+                                  void* sample, eprosima::fastdds::dds::SampleInfo& info);
   void open_best_effort_when_needed();
 
   std::function<std::unique_ptr<BestEffort>()> make_best_effort_;
@@ -94,6 +109,7 @@ class UntypedReader {
   Participant::ReaderHandle reader_;
   mutable std::mutex best_effort_mutex_;
   std::unique_ptr<BestEffort> best_effort_;
+  std::deque<UnreadableSample> unreadable_;
 };
 
 /// Reads samples of a generated type T from one topic. One thread takes.

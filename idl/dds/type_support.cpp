@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <utility>
 #include <vector>
 
 #include "rmw_dds_common_iron.h"
@@ -28,6 +29,20 @@ constexpr std::size_t instance_handle_bytes = 16;
 
 void set_encapsulation(const Cdr& cdr, SerializedPayload_t& payload) {
   payload.encapsulation = cdr.endianness() == Cdr::BIG_ENDIANNESS ? CDR_BE : CDR_LE;
+}
+
+thread_local RefusedBytes* listening = nullptr;
+
+/// Of bytes that are no sample: what their encapsulation says that they are, as RTPS 10.5 numbers
+/// it.
+std::string refusal_of(const SerializedPayload_t& payload) {
+  if (payload.length < encapsulation_bytes) return "less than an encapsulation";
+  const unsigned kind = payload.data[1];
+  const std::string length = std::to_string(payload.length) + " bytes";
+  if (payload.data[0] != 0 || kind > 0x0B) return length + " of an unknown encapsulation";
+  if (kind >= 0x06) return length + " of XCDR2, and only classic CDR (XCDR1) is read";
+  if (kind >= 0x02) return length + " of a parameter list, and only plain CDR is read";
+  return length + " that are no sample of the topic's type";
 }
 
 FastBuffer buffer_of(SerializedPayload_t& payload, std::size_t bytes) {
@@ -91,9 +106,15 @@ bool CdrTypeSupport::deserialize(SerializedPayload_t* payload, void* sample) {
     read(sample, cdr);
     return true;
   } catch (const std::exception&) {
-    return false;
+    if (listening == nullptr) return false;
+    listening->reason_ = refusal_of(*payload);
+    return true;
   }
 }
+
+RefusedBytes::RefusedBytes() : outer_(std::exchange(listening, this)) {}
+
+RefusedBytes::~RefusedBytes() { listening = outer_; }
 
 std::function<std::uint32_t()> CdrTypeSupport::getSerializedSizeProvider(void* sample) {
   return [this, sample] {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <typeinfo>
+#include <utility>
 
 #include "idl/msg/wire_types.hpp"
 
@@ -41,6 +42,25 @@ class CdrTypeSupport : public eprosima::fastdds::dds::TopicDataType {
   [[nodiscard]] virtual std::size_t cdr_bytes(const void* sample) const = 0;
 
   std::size_t max_key_bytes_;
+};
+
+/// While it lives, bytes that CdrTypeSupport refuses in this thread are told to it instead, and
+/// what was made of them is no sample: Fast DDS leaves out what is refused without a word.
+class RefusedBytes {
+ public:
+  RefusedBytes();
+  ~RefusedBytes();
+  RefusedBytes(const RefusedBytes&) = delete;
+  RefusedBytes& operator=(const RefusedBytes&) = delete;
+
+  /// Why bytes were refused since the last call, such as "XCDR2 ..."; empty: none were.
+  [[nodiscard]] std::string take_reason() { return std::exchange(reason_, {}); }
+
+ private:
+  friend class CdrTypeSupport;
+
+  std::string reason_;
+  RefusedBytes* outer_;
 };
 
 /// CdrTypeSupport of the generated type T.

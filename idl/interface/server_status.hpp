@@ -27,6 +27,8 @@ inline constexpr const char* scans_dropped_counter = "scans_dropped";
 /// Of clouds that could not be read as scans, a counter for every fault that occurred: "no_xyz".
 /// They are among the scans dropped.
 inline constexpr const char* bad_clouds_counter = "bad_clouds";
+/// What bad_clouds_counter counts of bytes that are no cloud at all.
+inline constexpr const char* unreadable_cloud = "unreadable";
 
 /// Of checkpoints that failed since the last one that did not: while it is above 0, what is mapped
 /// is in memory alone.

@@ -19,11 +19,14 @@ InitialPoseReceiver::InitialPoseReceiver(dds::Participant& participant,
     : map_frame_(std::move(map_frame)),
       finder_(finder),
       statistics_(statistics),
+      unreadable_(ros_topic, "initial_pose_unreadable", statistics),
       reader_(participant, dds::initial_pose_topic(ros_topic).dds_name,
               dds::initial_pose_topic(ros_topic).reader),
       worker_("initial_pose", std::chrono::seconds(0),
               [this, message = PoseWithCovarianceStamped()](const std::stop_token& stop) mutable {
-                if (reader_.take(message, stop, std::chrono::seconds(1))) take(message);
+                const bool came = reader_.take(message, stop, std::chrono::seconds(1));
+                unreadable_.report(reader_);
+                if (came) take(message);
               }) {}
 
 void InitialPoseReceiver::take(const PoseWithCovarianceStamped& message) {

@@ -7,6 +7,7 @@
 #include "server/localization/place_finder.hpp"
 #include "server/monitoring/log.hpp"
 #include "server/monitoring/statistics.hpp"
+#include "server/monitoring/unreadable_samples.hpp"
 #include "server/threads/periodic_worker.hpp"
 
 namespace stillmap::server {
@@ -27,6 +28,7 @@ class InitialPoseReceiver {
   PlaceFinder& finder_;
   Statistics& statistics_;
   ThrottledLog throttled_log_;
+  UnreadableSamples unreadable_;
   dds::Reader<geometry_msgs::msg::PoseWithCovarianceStamped> reader_;
   // Last: stops before what it uses is gone.
   PeriodicWorker worker_;

@@ -9,11 +9,14 @@ GnssReceiver::GnssReceiver(dds::Participant& participant, const std::string& ros
                            DeliveryMode delivery, LoopCorrector& loops, Statistics& statistics)
     : loops_(loops),
       statistics_(statistics),
+      unreadable_(ros_topic, "gnss_unreadable", statistics),
       reader_(participant, dds::gnss_topic(ros_topic, delivery).dds_name,
               dds::gnss_topic(ros_topic, delivery).reader),
       worker_("gnss", std::chrono::seconds(0),
               [this, message = sensor_msgs::msg::NavSatFix()](const std::stop_token& stop) mutable {
-                if (reader_.take(message, stop, std::chrono::seconds(1))) take(message);
+                const bool came = reader_.take(message, stop, std::chrono::seconds(1));
+                unreadable_.report(reader_);
+                if (came) take(message);
               }) {}
 
 void GnssReceiver::take(const sensor_msgs::msg::NavSatFix& message) {

@@ -8,6 +8,7 @@
 #include "server/mapping/loop_corrector.hpp"
 #include "server/monitoring/log.hpp"
 #include "server/monitoring/statistics.hpp"
+#include "server/monitoring/unreadable_samples.hpp"
 #include "server/threads/periodic_worker.hpp"
 
 namespace stillmap::server {
@@ -27,6 +28,7 @@ class GnssReceiver {
   LoopCorrector& loops_;
   Statistics& statistics_;
   ThrottledLog throttled_log_;
+  UnreadableSamples unreadable_;
   dds::Reader<sensor_msgs::msg::NavSatFix> reader_;
   // Last: stops before what it uses is gone.
   PeriodicWorker worker_;

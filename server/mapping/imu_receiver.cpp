@@ -53,12 +53,15 @@ std::vector<ImuSample> ImuQueue::take(std::int64_t until_ns, std::chrono::millis
 ImuReceiver::ImuReceiver(dds::Participant& participant, const std::string& ros_topic,
                          DeliveryMode delivery, Statistics& statistics)
     : patience_(patience_of(delivery)),
+      unreadable_(ros_topic, "imu_unreadable", statistics),
       reader_(participant, dds::imu_topic(ros_topic, delivery).dds_name,
               dds::imu_topic(ros_topic, delivery).reader),
       worker_("imu", std::chrono::seconds(0),
               [this, &statistics,
                message = sensor_msgs::msg::Imu()](const std::stop_token& stop) mutable {
-                if (!reader_.take(message, stop, std::chrono::seconds(1))) return;
+                const bool came = reader_.take(message, stop, std::chrono::seconds(1));
+                unreadable_.report(reader_);
+                if (!came) return;
                 if (const auto sample = wire::from_imu(message)) {
                   queue_.push(*sample);
                 } else {

@@ -13,6 +13,7 @@
 #include "idl/interface/server_status.hpp"
 #include "sensor_msgs.h"
 #include "server/monitoring/statistics.hpp"
+#include "server/monitoring/unreadable_samples.hpp"
 #include "server/threads/periodic_worker.hpp"
 
 namespace stillmap::server {
@@ -59,6 +60,7 @@ class ImuReceiver {
  private:
   std::chrono::milliseconds patience_;
   ImuQueue queue_;
+  UnreadableSamples unreadable_;
   dds::Reader<sensor_msgs::msg::Imu> reader_;
   // Last: stops before what it uses is gone.
   PeriodicWorker worker_;

@@ -98,11 +98,14 @@ std::optional<Eigen::Isometry3d> PoseBuffer::motion(std::int64_t from_ns,
 OdometryPrior::OdometryPrior(dds::Participant& participant, const std::string& ros_topic,
                              Statistics& statistics)
     : statistics_(statistics),
+      unreadable_(ros_topic, "odometry_prior_unreadable", statistics),
       reader_(participant, dds::odometry_prior_topic(ros_topic).dds_name,
               dds::odometry_prior_topic(ros_topic).reader),
       worker_("odom_prior", std::chrono::seconds(0),
               [this, message = nav_msgs::msg::Odometry()](const std::stop_token& stop) mutable {
-                if (reader_.take(message, stop, std::chrono::seconds(1))) add(message);
+                const bool came = reader_.take(message, stop, std::chrono::seconds(1));
+                unreadable_.report(reader_);
+                if (came) add(message);
               }) {}
 
 void OdometryPrior::add(const nav_msgs::msg::Odometry& message) {

@@ -9,6 +9,7 @@
 #include "idl/dds/reader.hpp"
 #include "nav_msgs.h"
 #include "server/monitoring/statistics.hpp"
+#include "server/monitoring/unreadable_samples.hpp"
 #include "server/threads/periodic_worker.hpp"
 
 namespace stillmap::server {
@@ -73,6 +74,7 @@ class OdometryPrior {
   PoseBuffer poses_;
   std::string odom_frame_;
   std::string frame_;
+  UnreadableSamples unreadable_;
   dds::Reader<nav_msgs::msg::Odometry> reader_;
   // Last: stops before what it uses is gone.
   PeriodicWorker worker_;

@@ -205,7 +205,9 @@ ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& co
       worker_("scans", std::chrono::seconds(0),
               [this, cloud = sensor_msgs::msg::PointCloud2()](const std::stop_token& stop) mutable {
                 eprosima::fastdds::dds::SampleInfo info;
-                if (reader_.take(cloud, info, stop, std::chrono::seconds(1))) {
+                const bool came = reader_.take(cloud, info, stop, std::chrono::seconds(1));
+                drop_unreadable();
+                if (came) {
                   count_losses(info.sample_identity);
                   accept(cloud, stop);
                 } else if (sweeps_ != nullptr) {
@@ -257,6 +259,16 @@ std::vector<dds::Diagnostic> ScanReceiver::loss_diagnostics() const {
     diagnostics.push_back(dds::lost_scans_diagnostic(topic_, of_writer, self, peers));
   }
   return diagnostics;
+}
+
+void ScanReceiver::drop_unreadable() {
+  for (const dds::UnreadableSample& sample : reader_.take_unreadable()) {
+    has_received_ = true;
+    count_losses(sample.identity);
+    if (sweeps_ == nullptr) statistics_.scan_received();
+    statistics_.bad_cloud(dds::unreadable_cloud);
+    drop("bad_cloud", 1, "bad cloud: it has " + sample.why);
+  }
 }
 
 void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std::stop_token& stop) {

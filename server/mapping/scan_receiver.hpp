@@ -108,6 +108,8 @@ class ScanReceiver {
   [[nodiscard]] Lidar* lidar_of(const std::string& frame);
   /// Counts the scans that are missing before this one.
   void count_losses(const eprosima::fastrtps::rtps::SampleIdentity& scan);
+  /// Clouds that the reader passed over: they arrived, and are none.
+  void drop_unreadable();
   void accept(const sensor_msgs::msg::PointCloud2& cloud, const std::stop_token& stop);
   /// Counts ids that SemanticKITTI does not have, and says once where its ids are none.
   void report_labels(const Lidar& lidar, const LabelCensus& census);

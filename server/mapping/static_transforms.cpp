@@ -14,15 +14,18 @@ constexpr std::size_t max_frames_shown = 20;
 StaticTransforms::StaticTransforms(dds::Participant& participant, const dds::Topics& topics,
                                    Statistics& statistics)
     : statistics_(statistics),
+      unreadable_("tf_static", "tf_static_unreadable", statistics),
       reader_(participant, topics.tf_static.dds_name, topics.tf_static.reader),
-      worker_("tf_static", std::chrono::seconds(0),
-              [this, message = tf2_msgs::msg::TFMessage()](const std::stop_token& stop) mutable {
-                eprosima::fastdds::dds::SampleInfo info;
-                // Our own are of the map, and tell nothing of the robot.
-                if (reader_.take(message, info, stop, std::chrono::seconds(1)) &&
-                    info.sample_identity.writer_guid().guidPrefix != reader_.guid().guidPrefix)
-                  take(message);
-              }) {}
+      worker_(
+          "tf_static", std::chrono::seconds(0),
+          [this, message = tf2_msgs::msg::TFMessage()](const std::stop_token& stop) mutable {
+            eprosima::fastdds::dds::SampleInfo info;
+            const bool came = reader_.take(message, info, stop, std::chrono::seconds(1));
+            unreadable_.report(reader_);
+            // Our own are of the map, and tell nothing of the robot.
+            if (came && info.sample_identity.writer_guid().guidPrefix != reader_.guid().guidPrefix)
+              take(message);
+          }) {}
 
 void StaticTransforms::take(const tf2_msgs::msg::TFMessage& message) {
   const std::vector<FrameTransform> transforms = wire::from_tf(message);

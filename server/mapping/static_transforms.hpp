@@ -11,6 +11,7 @@
 #include "idl/interface/topics.hpp"
 #include "server/monitoring/log.hpp"
 #include "server/monitoring/statistics.hpp"
+#include "server/monitoring/unreadable_samples.hpp"
 #include "server/threads/periodic_worker.hpp"
 
 namespace stillmap::server {
@@ -40,6 +41,7 @@ class StaticTransforms {
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   FrameTree tree_;
+  UnreadableSamples unreadable_;
   dds::Reader<tf2_msgs::msg::TFMessage> reader_;
   // Last: stops before what it uses is gone.
   PeriodicWorker worker_;

@@ -161,6 +161,16 @@ TEST_F(ChecksTest, TellRefusedCloudsByReason) {
                                 Field(&dds::Diagnostic::severity, dds::Severity::problem))));
 }
 
+TEST_F(ChecksTest, TellWhatCannotBeRead) {
+  status().counters = {{"scans_received", "", 10},
+                       {"bad_clouds", "unreadable", 10},
+                       {"tf_static_unreadable", "", 3}};
+  status().reason = "the last scan was dropped: bad cloud: it has 99 bytes of XCDR2";
+  EXPECT_THAT(check_scans(snapshot_),
+              ElementsAre(AllOf(says("unreadable"), shows("XCDR2"), advises("classic CDR")),
+                          AllOf(says("tf_static"), shows("3 messages"), advises("classic CDR"))));
+}
+
 TEST_F(ChecksTest, LookForTheFrame) {
   status().scan_frame = "velodyne";
   EXPECT_THAT(check_frames(snapshot_), ElementsAre(AllOf(says("'velodyne'"), shows("lidar, map"))));

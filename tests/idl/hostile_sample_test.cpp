@@ -63,5 +63,41 @@ TEST(HostileSample, IsPassedOverByAReaderThatGoesOn) {
   EXPECT_TRUE(has_last);
 }
 
+TEST(HostileSample, IsToldOfWithItsWriterItsNumberAndWhatItIs) {
+  Participant here(loopback(false));
+  Participant there(loopback(false));
+  Reader<PointCloud2> reader(there, "rt/points", {.depth = 10});
+  SerializedSampleWriter writer(here, "rt/points", type_support<PointCloud2>().get_type_name(),
+                                {.depth = 10});
+  ASSERT_TRUE(writer.readers().wait_for_any(discovery_timeout));
+  SerializedSample bytes = cloud_bytes(1);
+  bytes[1] = 0x07;  // XCDR2
+  eprosima::fastrtps::rtps::WriteParams unread, read;
+  ASSERT_TRUE(writer.write(bytes, unread));
+  ASSERT_TRUE(writer.write(cloud_bytes(2), read));
+  PointCloud2 got;
+  ASSERT_TRUE(reader.take(got, {}, discovery_timeout));
+  EXPECT_EQ(got.width(), 2U);
+  const std::vector<UnreadableSample> unreadable = reader.take_unreadable();
+  ASSERT_EQ(unreadable.size(), 1U);
+  EXPECT_EQ(unreadable[0].identity, unread.sample_identity());
+  EXPECT_NE(unreadable[0].why.find("XCDR2"), std::string::npos);
+  EXPECT_TRUE(reader.take_unreadable().empty());
+}
+
+TEST(HostileName, HasNothingThatATerminalObeysOrThatIsNoText) {
+  DdsOptions options = loopback(false);
+  options.participant_name = "lidar\x1b[2J\n\xFF";
+  Participant there(options);
+  const Participant here(loopback(false));
+  const SerializedSampleWriter writer(there, "rt/a\nb", "type\x1b", {});
+  const auto is_seen = [&] {
+    const std::vector<RemoteParticipant> peers = here.remote_participants();
+    return peers.size() == 1 && peers[0].name == "lidar?[2J??" && peers[0].endpoints.size() == 1 &&
+           peers[0].endpoints[0].topic == "rt/a?b" && peers[0].endpoints[0].type == "type?";
+  };
+  EXPECT_TRUE(test::eventually(is_seen, discovery_timeout, 5ms));
+}
+
 }  // namespace
 }  // namespace stillmap::dds

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "idl/conversions/to_cloud.hpp"
+#include "idl/dds/serialized_sample.hpp"
 #include "idl/dds/writer.hpp"
 #include "idl/interface/topics.hpp"
 #include "tests/server/room_scans.hpp"
@@ -65,6 +66,30 @@ TEST_F(HostileInput, BadCloudsAreCountedAndServiceGoesOn) {
   now = status();
   EXPECT_EQ(now.counter("scans_mapped"), 2U);
   EXPECT_THAT(now.reason, testing::Not(testing::HasSubstr("dropped")));
+}
+
+TEST(HostileEncoding, IsCountedAndNamedAndIsNoLoss) {
+  const ServiceSetup setup("every");
+  const ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  dds::Participant participant(setup.dds());
+  const auto topic = dds::points_topic("points", DeliveryMode::every, 4);
+  const auto type = dds::type_support<PointCloud2>();
+  dds::SerializedSampleWriter clouds(participant, topic.dds_name, type.get_type_name(),
+                                     topic.writer);
+  ASSERT_TRUE(clouds.readers().wait_for_any(patience));
+  const PointCloud2 cloud = wire::to_cloud(room_scan(0), {}, "lidar");
+  for (const unsigned encapsulation : {0x01U, 0x07U}) {
+    dds::SerializedSample bytes = dds::to_bytes(type, &cloud, 0);
+    bytes[1] = static_cast<std::uint8_t>(encapsulation);
+    eprosima::fastrtps::rtps::WriteParams params;
+    ASSERT_TRUE(clouds.write(bytes, params));
+  }
+  ASSERT_TRUE(wait_for_scans(client, 2));
+  const dds::ServerStatus now = client.status();
+  EXPECT_EQ(now.counter("bad_clouds", "unreadable"), 1U);
+  EXPECT_EQ(now.counter("scans_lost"), 0U);
+  EXPECT_THAT(now.reason, testing::HasSubstr("XCDR2"));
 }
 
 TEST_F(HostileInput, ScansOutOfOrderOrRepeatedAreDropped) {
