@@ -147,9 +147,30 @@ void compare_with_server(const DiscoveredServer& server, Diagnostics& diagnostic
                          .hint = "keep both by NTP or PTP (timedatectl set-ntp true; chrony)"});
 }
 
+/// "1 h 0 min" of a delay that is hours as clocks of other time zones differ; empty of others.
+std::string hours_behind(double delay_s) {
+  constexpr double most_hours = 14.0;
+  constexpr double tolerance_s = 120.0;
+  const double hours = std::round(delay_s / 3600.0);
+  const bool is_near = std::abs(delay_s - 3600.0 * hours) <= tolerance_s;
+  if (!(hours >= 1.0 && hours <= most_hours && is_near)) return {};
+  const int minutes = static_cast<int>(std::round(delay_s / 60.0));
+  return std::to_string(minutes / 60) + " h " + std::to_string(minutes % 60) + " min";
+}
+
 void compare_with_sensor(const dds::ServerStatus& status, Diagnostics& diagnostics) {
   const double delay_s = status.scan_delay_s;
-  if (status.counter("scans_received") == 0 || delay_s > replayed_age_s) return;
+  if (status.counter("scans_received") == 0) return;
+  if (const std::string hours = hours_behind(delay_s); !hours.empty()) {
+    diagnostics.push_back(
+        {.severity = dds::Severity::advice,
+         .what = "the scans' stamps are about " + hours + " behind: a time zone or a replay?",
+         .evidence = "the last scan's stamp is " + seconds(delay_s) + " behind the server's clock",
+         .hint = "let the sensor's clock and this machine's have UTC (PTP, NTP), not local time; a "
+                 "replayed bag has old stamps"});
+    return;
+  }
+  if (delay_s > replayed_age_s) return;
   if (delay_s >= -max_clock_offset_s && delay_s <= 1.0) return;
   diagnostics.push_back(
       {.severity = dds::Severity::advice,

@@ -171,6 +171,20 @@ TEST_F(ChecksTest, TellWhatCannotBeRead) {
                           AllOf(says("tf_static"), shows("3 messages"), advises("classic CDR"))));
 }
 
+TEST_F(ChecksTest, AskAboutTimeZonesWhereClocksDifferByHours) {
+  status().counters = {{"scans_received", "", 10}};
+  for (const double delay_s : {3590.0, 3600.2, 3660.0}) {
+    status().scan_delay_s = delay_s;
+    EXPECT_THAT(check_clocks(snapshot_), ElementsAre(AllOf(says(" h "), says("time zone"))));
+  }
+  status().scan_delay_s = 8 * 3600.0 + 65.0;
+  EXPECT_THAT(check_clocks(snapshot_), ElementsAre(says("8 h 1 min")));
+  for (const double delay_s : {5400.0, 15 * 3600.0, 2.0e7}) {
+    status().scan_delay_s = delay_s;
+    EXPECT_THAT(check_clocks(snapshot_), IsEmpty());
+  }
+}
+
 TEST_F(ChecksTest, LookForTheFrame) {
   status().scan_frame = "velodyne";
   EXPECT_THAT(check_frames(snapshot_), ElementsAre(AllOf(says("'velodyne'"), shows("lidar, map"))));
