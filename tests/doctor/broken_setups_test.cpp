@@ -6,8 +6,10 @@
 #include <thread>
 
 #include "clients/library/scan_publisher.hpp"
+#include "idl/dds/ros_graph.hpp"
 #include "idl/dds/writer.hpp"
 #include "nav_msgs.h"
+#include "rmw_dds_common.h"
 #include "sensor_msgs.h"
 #include "tests/clients/process.hpp"
 #include "tests/eventually.hpp"
@@ -90,6 +92,29 @@ TEST_F(BrokenSetup, IsTheLastThingThatAHealthyOneIs) {
   const auto found = problems();
   EXPECT_THAT(found, IsEmpty());
   EXPECT_EQ(exit_code_, 0);
+}
+
+TEST_F(BrokenSetup, NamesTheNodesOfAParticipantWithoutAName) {
+  dds::DdsOptions options = dds(domain_);
+  options.node_name = "";
+  // As rmw_fastrtps names those of all its processes.
+  options.participant_name = "/";
+  dds::Participant participant(options);
+  using rmw_dds_common::msg::ParticipantEntitiesInfo;
+  dds::Writer<ParticipantEntitiesInfo> writer(participant, dds::ros_discovery_topic,
+                                              {.transient_local = true, .depth = 1});
+  ParticipantEntitiesInfo info;
+  info.node_entities_info_seq().resize(1);
+  info.node_entities_info_seq()[0].node_namespace("/robot");
+  info.node_entities_info_seq()[0].node_name("rviz2");
+  ASSERT_TRUE(writer.write(info));
+  const std::string doctor = "doctor --interface 127.0.0.1 --domain " + std::to_string(domain_);
+  EXPECT_THAT(run_stillmap(doctor, folder_.path()).out, HasSubstr("\n/robot/rviz2 "));
+  const std::string out = run_stillmap(doctor + " --json", folder_.path()).out;
+  ASSERT_TRUE(json::accept(out)) << out;
+  EXPECT_THAT(json::parse(out).at("participants"),
+              Contains(ResultOf([](const json& one) { return one.at("nodes"); },
+                                json::array({"/robot/rviz2"}))));
 }
 
 TEST_F(BrokenSetup, WithoutAPublisher) {

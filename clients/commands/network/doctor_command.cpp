@@ -33,7 +33,7 @@ std::string participant_table(const SystemSnapshot& snapshot) {
   for (const dds::RemoteParticipant& participant : snapshot.participants) {
     const auto writers = std::ranges::count(participant.endpoints, true, &dds::Endpoint::is_writer);
     const auto all = static_cast<std::ptrdiff_t>(participant.endpoints.size());
-    table.add({participant.name, participant.vendor, dds::describe_location(participant),
+    table.add({display_name(participant), participant.vendor, dds::describe_location(participant),
                std::to_string(writers), std::to_string(all - writers),
                participant.refused ? "refused" : (participant.is_secured ? "yes" : "no")});
   }
@@ -44,8 +44,8 @@ std::string endpoint_table(const SystemSnapshot& snapshot) {
   Table table({"topic", "kind", "participant", "quality of service", "type"});
   for (const dds::RemoteParticipant& participant : snapshot.participants) {
     for (const dds::Endpoint& endpoint : participant.endpoints) {
-      table.add({endpoint.topic, endpoint.is_writer ? "writer" : "reader", participant.name,
-                 describe(endpoint.qos), endpoint.type});
+      table.add({endpoint.topic, endpoint.is_writer ? "writer" : "reader",
+                 display_name(participant), describe(endpoint.qos), endpoint.type});
     }
   }
   return table.text() + "\n";
@@ -79,6 +79,7 @@ Json json_of(const dds::RemoteParticipant& participant) {
   for (const dds::Endpoint& endpoint : participant.endpoints)
     endpoints.push_back(json_of(endpoint));
   return {{"name", participant.name},
+          {"nodes", participant.ros_nodes},
           {"vendor", participant.vendor},
           {"host", participant.host},
           {"process", participant.process},
