@@ -29,10 +29,10 @@ std::string fault_of_name(const std::string& name) {
            std::string_view("/\\:?*%\"<>|").find(static_cast<char>(c)) != std::string_view::npos;
   };
   const auto ends_as = [&](std::string_view ending) { return name.ends_with(ending); };
-  if (name.empty() || name.front() == '.' || name.front() == '-' ||
-      std::ranges::any_of(name, is_special)) {
-    return "must be a plain name, without any of / \\ : ? * % \" < > | and not beginning with . or "
-           "-; it is looked for beside the configured map file";
+  if (name.empty() || name.front() == '.' || name.front() == '-' || name.front() == ' ' ||
+      name.back() == ' ' || std::ranges::any_of(name, is_special)) {
+    return "must be a plain name, without any of / \\ : ? * % \" < > | not beginning with . or -, "
+           "and with no space at either end; it is looked for beside the configured map file";
   }
   if (name.size() > max_name_bytes) {
     return "has " + std::to_string(name.size()) + " bytes; choose a plain name of " +

@@ -203,6 +203,7 @@ TEST_F(OperationTest, HealthSaysWhetherTheServerAnswersAndMaps) {
   const ProcessResult alive = run("health" + patiently() + on_domain());
   EXPECT_EQ(alive.exit_code, 0) << alive.out;
   EXPECT_THAT(alive.out, testing::StartsWith("healthy: "));
+  EXPECT_THAT(run("health --json" + patiently() + on_domain()).out, HasSubstr("\"healthy\": true"));
   const ProcessResult idle = run("health --mapping" + patiently() + on_domain());
   EXPECT_EQ(idle.exit_code, 1);
   EXPECT_THAT(idle.out, HasSubstr("unhealthy: no scans arrive"));

@@ -275,9 +275,9 @@ TEST_F(MapSaverSafetyTest, NamesMeanFilesInTheFolderAndNoOthers) {
   sqlite3_close(other);
   std::string uri = "file:";
   for (const char c : outside.string()) uri += c == '/' ? std::string("%2F") : std::string(1, c);
-  for (const std::string& name :
-       {uri, uri + "?x=1", outside.string(), std::string("a/b"), std::string("a\\b"),
-        std::string(".hidden"), std::string("-x"), std::string("x.lock"), std::string(300, 'x')}) {
+  for (const std::string& name : {uri, uri + "?x=1", outside.string(), std::string("a/b"),
+                                  std::string("a\\b"), std::string(".hidden"), std::string("-x"),
+                                  std::string(" "), std::string("x.lock"), std::string(300, 'x')}) {
     EXPECT_THAT(why_refused([&] { saver.save_as(name); }), HasSubstr("plain name")) << name;
     EXPECT_THAT(why_refused([&] { saver.resume_from(name, prepare_); }), HasSubstr("plain name"));
   }

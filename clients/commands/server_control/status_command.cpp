@@ -25,6 +25,7 @@ ExitCode run(const StatusArguments& arguments) {
 struct HealthArguments {
   ClientArguments client;
   bool mapping = false;
+  bool json = false;
 };
 
 /// Why the server loses what it maps when it ends; empty when it does not.
@@ -52,12 +53,16 @@ std::string other_diagnostics(const dds::ServerStatus& status) {
   return text;
 }
 
-ExitCode say(ExitCode code, const std::string& text) {
-  std::cout << (code == ExitCode::ok ? "healthy: " : "unhealthy: ") << text << "\n";
-  return code;
-}
-
 ExitCode run(const HealthArguments& arguments) {
+  const auto say = [&](ExitCode code, const std::string& text) {
+    const bool is_healthy = code == ExitCode::ok;
+    if (arguments.json) {
+      std::cout << Json{{"healthy", is_healthy}, {"text", text}}.dump(2) << "\n";
+    } else {
+      std::cout << (is_healthy ? "healthy: " : "unhealthy: ") << text << "\n";
+    }
+    return code;
+  };
   dds::ServerStatus status;
   try {
     status = connect(arguments.client).status();
@@ -100,6 +105,7 @@ void add_health_command(CommandHandle program, Action& action) {
   add_client_options(command, arguments->client);
   command.flag("--mapping", arguments->mapping,
                "Unhealthy as well when no scans arrive or none is mapped, or the odometry is lost");
+  command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"
       "  stillmap health                     is it alive: Docker's HEALTHCHECK, a liveness probe\n"
