@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <vector>
 
@@ -32,6 +33,9 @@ constexpr double correlated_fixes = 10.0;
 /// Of a delay of seconds, in all and as a share of what there is to gain.
 constexpr double min_gain = 5.0;
 constexpr double min_gain_share = 0.1;
+/// Of delays that gain so much of what the best one does, the shortest is the one: a way that goes
+/// on as it went fits itself a bend later, too.
+constexpr double as_good_share = 0.95;
 /// One stretch alone could be a fault of the receiver.
 constexpr double min_stretches = 2.0;
 
@@ -293,6 +297,23 @@ double gain(const std::vector<double>& from, const std::vector<double>& to) {
   return sum;
 }
 
+struct Candidate {
+  double delay_s = 0.0;
+  double gain = 0.0;
+};
+
+template <typename GainOf>
+Candidate best_near(double about_s, const GainOf& gain_of) {
+  const auto steps = static_cast<int>(coarse_step_s / fine_step_s);
+  Candidate best{about_s, gain_of(about_s)};
+  for (int k = -steps; k <= steps; ++k) {
+    const double delay_s = about_s + k * fine_step_s;
+    const double gained = gain_of(delay_s);
+    if (gained > best.gain) best = {delay_s, gained};
+  }
+  return best;
+}
+
 }  // namespace
 
 std::optional<GnssDelay> estimate_delay(std::span<const PlanPose> way,
@@ -301,21 +322,25 @@ std::optional<GnssDelay> estimate_delay(std::span<const PlanPose> way,
   const Stretches stretches(way, fixes, config);
   if (stretches.size() < 2) return std::nullopt;
   const std::vector<double> without = stretches.costs(0.0);
-  double best_s = 0.0, best_gain = 0.0;
-  const auto look_at = [&](double delay_s) {
-    const double gained = gain(without, stretches.costs(delay_s));
-    if (gained <= best_gain) return;
-    best_gain = gained;
-    best_s = delay_s;
-  };
+  const auto gain_of = [&](double delay_s) { return gain(without, stretches.costs(delay_s)); };
   const auto coarse = static_cast<int>(config.max_delay_s / coarse_step_s);
-  for (int k = -coarse; k <= coarse; ++k) look_at(k * coarse_step_s);
+  std::vector<double> gains;
+  for (int k = -coarse; k <= coarse; ++k) gains.push_back(gain_of(k * coarse_step_s));
   // Who drives the same round again and again fits about as well a round later.
   const double total = gain(without, std::vector<double>(without.size(), 0.0));
-  if (best_gain < std::max(min_gain, min_gain_share * total)) best_s = best_gain = 0.0;
-  const double about_s = best_s;
-  const auto fine = static_cast<int>(coarse_step_s / fine_step_s);
-  for (int k = -fine; k <= fine; ++k) look_at(about_s + k * fine_step_s);
+  const double least =
+      std::max({min_gain, min_gain_share * total, 0.5 * *std::ranges::max_element(gains)});
+  std::vector<Candidate> candidates{best_near(0.0, gain_of)};
+  for (std::size_t k = 1; k + 1 < gains.size(); ++k) {
+    if (gains[k] < least || gains[k] < gains[k - 1] || gains[k] < gains[k + 1]) continue;
+    candidates.push_back(best_near((static_cast<double>(k) - coarse) * coarse_step_s, gain_of));
+  }
+  const double most = std::ranges::max(candidates, {}, &Candidate::gain).gain;
+  double best_s = std::numeric_limits<double>::infinity();
+  for (const Candidate& candidate : candidates) {
+    if (candidate.gain >= as_good_share * most && std::abs(candidate.delay_s) < std::abs(best_s))
+      best_s = candidate.delay_s;
+  }
   return stretches.refined(best_s);
 }
 

@@ -3,8 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <functional>
 #include <utility>
+#include <vector>
 
 #include "core/geodesy/east_north_up.hpp"
 #include "tests/graph/street_world.hpp"
@@ -217,6 +220,38 @@ TEST(LiveLoopCloser, AFirstFixOfAnotherPlaceDoesNotSayWhereTheMapLies) {
   const Eigen::Isometry3d T_error =
       earth.T_earth(Eigen::Isometry3d::Identity()).inverse() * place->T_earth_map;
   EXPECT_LT(Eigen::AngleAxisd(T_error.linear()).angle(), 0.02);
+}
+
+TEST(LiveLoopCloser, StampsThatAreLateMoveTheMapUntilThatIsFoundOut) {
+  const EastNorthUp earth(49.0, 8.4, 115.0);
+  LiveLoopCloser closer{LiveLoopConfig{}};
+  std::vector<Eigen::Isometry3d> truth, in_map;
+  Eigen::Isometry3d T_truth = Eigen::Isometry3d::Identity();
+  constexpr std::size_t late_scans = 4;
+  for (std::size_t i = 0; i < 600; ++i) {
+    const double turn_rad = 0.04 * std::cos(static_cast<double>(i) / 15.0);
+    truth.push_back(T_truth);
+    T_truth = T_truth * Eigen::Translation3d(1.0, 0.0, 0.0) *
+              Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ());
+    LabelledScan scan;
+    scan.scan.stamp_ns = static_cast<std::int64_t>(i + 1) * 100'000'000;
+    GnssFix fix = earth.fix_at(truth[i - std::min(i, late_scans)].translation());
+    fix.stamp_ns = scan.scan.stamp_ns;
+    fix.covariance_enu = 0.0004 * Eigen::Matrix3d::Identity();
+    EXPECT_EQ(closer.add(fix), "");
+    in_map.push_back(truth[i]);
+    if (i > 0) in_map[i] = in_map[i - 1] * truth[i - 1].inverse() * truth[i];
+    const auto correction = closer.add(scan, truth[i], true);
+    if (!correction) continue;
+    for (std::size_t k = 0; k <= i; ++k) in_map[k] = correction->poses()[k].T_new_old * in_map[k];
+  }
+  EXPECT_NEAR(closer.gnss().delay().delay_s, 0.4, 0.01);
+  EXPECT_FALSE(closer.are_positions_refused());
+  ASSERT_TRUE(closer.on_earth());
+  double worst_m = 0.0;
+  for (std::size_t i = 0; i < truth.size(); ++i)
+    worst_m = std::max(worst_m, (in_map[i].translation() - truth[i].translation()).norm());
+  EXPECT_LT(worst_m, 0.2);
 }
 
 }  // namespace
