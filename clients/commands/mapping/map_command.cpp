@@ -373,7 +373,6 @@ ExitCode run(const MapArguments& arguments) {
   const ScanDataset dataset =
       open_recording(arguments.dataset, arguments.recording, arguments.mapper.config_file);
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
-  const std::string told_by = sensor_origin(arguments.mapper);
   const MappedBody body = body_of(arguments.mount, arguments.mapper.config_file);
   static_cast<void>(arguments.range.end(dataset));
   static_cast<void>(denied_loops(arguments, dataset));
@@ -402,7 +401,7 @@ ExitCode run(const MapArguments& arguments) {
   }
   MapOutput output =
       write_map_output(out, truth, arguments.dataset, earlier.get(), result, config, body);
-  output.sensor_origin = told_by;
+  output.sensor_origin = sensor_origin(arguments.mapper);
   const Json report = to_json(result, output);
   write_report(out.unfinished() / "report.json", report);
   out.publish(result.stopped);
