@@ -172,8 +172,29 @@ GroundLevel::GroundLevel(const ColumnGrid& columns, double cell_m)
   for_each_cell(low_m, [&](int x, int y) { blocks_m_(x, y) = median_around(low_m, x, y); });
 }
 
+/// Interpolated between the middles of blocks: on a slope, one level for each would be far off at
+/// their borders.
 float GroundLevel::at(int x, int y) const {
-  return blocks_m_(x / cells_per_block_, y / cells_per_block_);
+  const auto in_blocks = [this](int cell) {
+    return (static_cast<float>(cell) + 0.5F) / static_cast<float>(cells_per_block_) - 0.5F;
+  };
+  const float column = in_blocks(x);
+  const float row = in_blocks(y);
+  const int first_column = static_cast<int>(std::floor(column));
+  const int first_row = static_cast<int>(std::floor(row));
+  float sum_m = 0.0F;
+  float weight = 0.0F;
+  for (const int block_y : {first_row, first_row + 1}) {
+    for (const int block_x : {first_column, first_column + 1}) {
+      if (!blocks_m_.contains(block_x, block_y) || std::isnan(blocks_m_(block_x, block_y)))
+        continue;
+      const float share = (1.0F - std::abs(column - static_cast<float>(block_x))) *
+                          (1.0F - std::abs(row - static_cast<float>(block_y)));
+      sum_m += share * blocks_m_(block_x, block_y);
+      weight += share;
+    }
+  }
+  return weight > 0.0F ? sum_m / weight : nan;
 }
 
 GroundGrid seen_ground(const ColumnGrid& columns, const GroundLevel& level) {

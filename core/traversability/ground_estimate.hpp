@@ -37,7 +37,8 @@ struct GroundCell {
 using ColumnGrid = CellGrid<Column>;
 using GroundGrid = CellGrid<GroundCell>;
 
-/// Coarse ground level, from low percentiles of the columns around. `cell_m` is the edge of a cell.
+/// Coarse ground level, from low percentiles of the columns around, interpolated between blocks of
+/// them. `cell_m` is the edge of a cell.
 class GroundLevel {
  public:
   GroundLevel(const ColumnGrid& columns, double cell_m);

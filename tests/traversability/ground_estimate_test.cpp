@@ -96,5 +96,19 @@ TEST(Ground, StandsWhereNoiseIsASmallPartOfTheStep) {
   EXPECT_EQ(lethal, 0);
 }
 
+TEST(Ground, ASteepSlopeWithoutLabelsIsSeenAllOverIt) {
+  VoxelWorld world;
+  const auto slope = [](double x_m, double y_m) { return 0.46 * x_m + 0.1 * y_m; };
+  world.ground(-7, -7, 7, 7, unlabeled, slope);
+  const auto view = traversability_of(world.view(), square_robot());
+  for (double x_m = -3.9; x_m < 4.0; x_m += 0.2) {
+    for (double y_m = -3.9; y_m < 4.0; y_m += 0.2) {
+      const GroundCell& ground = look(*view, x_m, y_m).surface->ground;
+      EXPECT_EQ(ground.origin, GroundOrigin::seen) << x_m << ", " << y_m;
+      EXPECT_NEAR(ground.height_m, slope(x_m, y_m), 1e-3);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace stillmap
