@@ -80,7 +80,8 @@ py::object plan(const Traversability& where, const std::vector<double>& start,
 
 constexpr const char* plan_help =
     "Plans a path of the robot's footprint. start, goal: (x, y) or (x, y, heading_rad), map frame "
-    "[m]. The answer has is_found, status, reason, poses_map (n, 3: x, y, heading), height_m (n,), "
+    "[m]. The answer has is_found, status, reason, poses_map (n, 3: x, y, heading), height_m (n,; "
+    "NaN where the ground is unknown), "
     "length_m, clearance_m, cost. Threads plan one after the other.";
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <sstream>
 #include <stdexcept>
@@ -109,10 +110,32 @@ std::optional<Eigen::AlignedBox2d> search_box(const TraversabilityView& view, co
   return within(fitting_m);
 }
 
-double height_at(CellLookup& lookup, const TraversabilityView& view, const PlanarPose& pose) {
-  const auto cell = view.cell_of(pose.position_map);
+/// Height of the ground; NaN where unknown.
+double height_at(CellLookup& lookup, const TraversabilityView& view,
+                 const Eigen::Vector2d& position_map) {
+  const auto cell = view.cell_of(position_map);
   const SurfaceCell* surface = cell ? lookup.at(*cell).surface : nullptr;
-  return surface != nullptr && surface->ground.is_known() ? surface->ground.height_m : 0.0;
+  return surface != nullptr && surface->ground.is_known()
+             ? surface->ground.height_m
+             : std::numeric_limits<double>::quiet_NaN();
+}
+
+/// Why the robot does not stand on the ground that the map has at the start; empty where it does or
+/// nobody knows. The map has one layer of ground: below a bridge, the lower one.
+std::string fault_of_level(const TraversabilityView& view, const Goal& from) {
+  if (!from.height_m) return {};
+  // Of storeys and bridges, less what the ground may be off.
+  constexpr double storey_m = 2.0;
+  CellLookup lookup(view);
+  const double above_m = *from.height_m - height_at(lookup, view, from.position_map);
+  // Also where the ground is unknown.
+  if (!(above_m > view.profile.height_m + storey_m) && !(above_m < -storey_m)) return {};
+  std::ostringstream text;
+  text << "'" << view.profile.name << "' is not on the ground that the map has at "
+       << text_of(from.position_map) << ", which lies " << std::abs(above_m) << " m "
+       << (above_m > 0.0 ? "below" : "above")
+       << " it: of levels above each other, as of a bridge and what is below, the map has one";
+  return text.str();
 }
 
 void set_poses(const TraversabilityView& view, std::span<const PathPoint> path, PathPlan& plan) {
@@ -122,8 +145,8 @@ void set_poses(const TraversabilityView& view, std::span<const PathPoint> path, 
   for (const PathPoint& driven : path) {
     plan.length_m += driven.at.step_m;
     if (driven.at.is_reverse) plan.reverse_m += driven.at.step_m;
-    plan.poses.push_back({driven.at.pose, height_at(lookup, view, driven.at.pose), plan.length_m,
-                          driven.at.is_reverse});
+    plan.poses.push_back({driven.at.pose, height_at(lookup, view, driven.at.pose.position_map),
+                          plan.length_m, driven.at.is_reverse});
   }
   plan.cost = path.back().cost;
 }
@@ -303,6 +326,8 @@ PathPlan plan_path(const TraversabilityView& view, const Goal& from, const Goal&
   const std::string faults = config.faults();
   if (!faults.empty()) throw std::invalid_argument("planning: " + faults);
   if (auto refused = refusal(view, from, to)) return *std::move(refused);
+  if (const std::string fault = fault_of_level(view, from); !fault.empty())
+    return failed(view, PlanStatus::start_blocked, fault);
   const FreePoses start = free_poses_at(view, from);
   if (start.poses.empty()) return blocked(view, PlanStatus::start_blocked, from, start);
   const FreePoses goal = free_poses_at(view, to);

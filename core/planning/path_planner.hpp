@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -52,13 +53,17 @@ struct Goal {
   Eigen::Vector2d position_map = Eigen::Vector2d::Zero();
   /// Counterclockwise from x; any heading if not set.
   std::optional<double> heading_rad;
+  /// Of any part of the robot there, map frame [m]; unknown if not set. A start whose ground lies
+  /// on another level, as that below a bridge, is refused.
+  std::optional<double> height_m = std::nullopt;
 };
 
 enum class PlanStatus : std::uint8_t {
   found,
   /// `reason` names the invalid value and the valid ones.
   invalid_request,
-  /// The robot collides at the start: see `conflict` and `nearby`.
+  /// The robot collides at the start: see `conflict` and `nearby`. Or it is not on the ground that
+  /// the map has there.
   start_blocked,
   /// As start_blocked, of the goal.
   goal_blocked,
@@ -74,8 +79,8 @@ enum class PlanStatus : std::uint8_t {
 /// A pose of a planned path.
 struct PlannedPose {
   PlanarPose pose;
-  /// Height of the ground, map frame [m]; 0 where unknown.
-  double height_m = 0.0;
+  /// Height of the ground, map frame [m]; NaN where unknown.
+  double height_m = std::numeric_limits<double>::quiet_NaN();
   /// Distance along the path [m].
   double along_m = 0.0;
   /// Whether the robot drives to it in reverse.

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "tests/clients/command_test.hpp"
 
 namespace stillmap::test {
@@ -32,6 +34,18 @@ TEST_F(PlanCommandTest, PlansOnAMapFilePrintsWritesAndDraws) {
   EXPECT_GE(plan.at("length_m"), 7.99);
   EXPECT_EQ(plan.at("path").size(), plan.at("poses"));
   EXPECT_EQ(plan.at("path").size() + 1, line_count("path.csv"));
+}
+
+TEST_F(PlanCommandTest, OnUnknownGroundHeightsAreNullAndEmpty) {
+  make_map();
+  const std::string beyond = on_map() + "--from 1,0,0 --to 9,400 --through-unknown ";
+  const ProcessResult json = run(beyond + "--json --output " + path("path.csv"));
+  ASSERT_EQ(json.exit_code, 0) << json.err << json.out;
+  const nlohmann::json poses = nlohmann::json::parse(json.out).at("path");
+  EXPECT_TRUE(std::any_of(poses.begin(), poses.end(),
+                          [](const auto& pose) { return pose.at("z_m").is_number(); }));
+  EXPECT_TRUE(poses.back().at("z_m").is_null());
+  EXPECT_THAT(content("path.csv"), HasSubstr("\n9.000,400.000,,"));
 }
 
 TEST_F(PlanCommandTest, WithoutAPathItSaysWhyWithItsOwnExitCode) {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <numbers>
 
@@ -145,6 +146,32 @@ TEST(PathPlanner, DrivesOnUnknownGroundOnlyIfAllowed) {
   expect_drivable(*view, plan);
   // Also to a place that no tile covers.
   expect_drivable(*view, plan_path(*view, {{30, -3}, {}}, {{80, -3}, {}}));
+}
+
+TEST(PathPlanner, OnUnknownGroundTheHeightIsUnknown) {
+  VoxelWorld world = two_lanes();
+  world.clear(46, -6, 60, 6);
+  RobotProfile robot = square_robot();
+  robot.unknown = UnknownGround::allowed;
+  const auto view = traversability_of(world.view(), robot);
+  const PathPlan plan = plan_path(*view, {{30, -3}, {}}, {{80, -3}, {}});
+  ASSERT_TRUE(plan.is_found()) << plan.reason;
+  EXPECT_NEAR(plan.poses.front().height_m, 0.1, 1e-3);
+  EXPECT_TRUE(std::isnan(plan.poses.back().height_m));
+}
+
+TEST(PathPlanner, ARobotOnABridgeIsNotPlannedForOnTheGroundBelow) {
+  VoxelWorld world;
+  world.ground(-10, -10, 10, 10, road);
+  world.block(-10, -2, 10, 2, 5.1, 5.2, road);
+  const auto view = traversability_of(world.view(), square_robot());
+  const Goal to{{0, 6}, {}};
+  const PathPlan on_deck = plan_path(*view, {{0, 0}, {}, 5.9}, to);
+  EXPECT_EQ(on_deck.status, PlanStatus::start_blocked);
+  EXPECT_THAT(on_deck.reason, HasSubstr("5.8 m below"));
+  EXPECT_EQ(plan_path(*view, {{0, 0}, {}, -3.0}, to).status, PlanStatus::start_blocked);
+  EXPECT_TRUE(plan_path(*view, {{0, 0}, {}, 0.9}, to).is_found());
+  EXPECT_TRUE(plan_path(*view, {{0, 0}, {}}, to).is_found());
 }
 
 TEST(PathPlanner, AtTheGoalThePathIsOnePose) {

@@ -1,5 +1,6 @@
 #include "clients/commands/planning/plan_report.hpp"
 
+#include <cmath>
 #include <fstream>
 #include <numbers>
 #include <stdexcept>
@@ -23,6 +24,11 @@ Json pose_json(const PlannedPose& pose) {
           {"reverse", pose.is_reverse}};
 }
 
+/// Empty where the ground is unknown.
+std::string height(const PlannedPose& pose, int decimals) {
+  return std::isfinite(pose.height_m) ? fixed(pose.height_m, decimals) : std::string();
+}
+
 /// Poses some metres apart, and both ends.
 std::string pose_table(const PathPlan& plan) {
   constexpr double max_rows = 20.0;
@@ -33,8 +39,8 @@ std::string pose_table(const PathPlan& plan) {
     if (pose.along_m < next_m && &pose != &plan.poses.back()) continue;
     next_m = pose.along_m + spacing_m;
     table.add({fixed(pose.along_m, 1), fixed(pose.pose.position_map.x(), 2),
-               fixed(pose.pose.position_map.y(), 2), fixed(pose.height_m, 2),
-               fixed(heading_deg(pose), 0), pose.is_reverse ? "reverse" : "forward"});
+               fixed(pose.pose.position_map.y(), 2), height(pose, 2), fixed(heading_deg(pose), 0),
+               pose.is_reverse ? "reverse" : "forward"});
   }
   return table.text();
 }
@@ -57,7 +63,7 @@ void write_csv(std::ostream& out, const PathPlan& plan) {
   out << "x_m,y_m,z_m,heading_deg,along_m,reverse\n";
   for (const PlannedPose& pose : plan.poses) {
     out << fixed(pose.pose.position_map.x(), 3) << ',' << fixed(pose.pose.position_map.y(), 3)
-        << ',' << fixed(pose.height_m, 3) << ',' << fixed(heading_deg(pose), 2) << ','
+        << ',' << height(pose, 3) << ',' << fixed(heading_deg(pose), 2) << ','
         << fixed(pose.along_m, 3) << ',' << (pose.is_reverse ? 1 : 0) << '\n';
   }
 }

@@ -67,7 +67,8 @@ void RobotPoseSubscription::set(const StampedPose& pose) {
 Goal RobotPoseSubscription::pose() const {
   const std::lock_guard lock(mutex_);
   const Eigen::Isometry3d& T = newest_.T_map_lidar;
-  return {T.translation().head<2>(), std::atan2(T.linear()(1, 0), T.linear()(0, 0))};
+  return {T.translation().head<2>(), std::atan2(T.linear()(1, 0), T.linear()(0, 0)),
+          T.translation().z()};
 }
 
 }  // namespace stillmap::cli
