@@ -293,7 +293,9 @@ std::optional<float> Holes::pit_edge_m(int x, int y, std::size_t direction) cons
   for (const std::optional<End>& one : {a, b}) {
     if (!one) continue;
     const float ground_m = one->cell->height_m;
-    const double slope = a && b ? fall_slope : open_fall_slope;
+    double slope = a && b ? fall_slope : open_fall_slope;
+    // Of a wide one that is not deep, the far edge lies no steeper than a slope.
+    if (a && b && one->distance_m > std::min(a->distance_m, b->distance_m)) slope = 0.0;
     if (!falls_away(columns_(x, y), ground_m, one->distance_m, slope)) return std::nullopt;
     if (fallen_neighbours(x, y, ground_m, one->distance_m, slope) < min_pit_neighbours)
       return std::nullopt;

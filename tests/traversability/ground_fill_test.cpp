@@ -132,7 +132,7 @@ TEST(GroundFill, NotOverAPitOrADitchWhoseBottomWasMeasured) {
 
 TEST(GroundFill, NoRobotThatGoesThroughUnknownGroundCrossesADitchWhoseBottomWasMeasured) {
   for (const SemanticClass label : {terrain, unlabeled}) {
-    for (const double depth_m : {0.8, 1.2, 2.0}) {
+    for (const double depth_m : {0.6, 0.8, 1.2, 2.0}) {
       for (const double width_m : {0.6, 1.0, 2.0}) {
         // Wherever the blocks of the ground's level begin.
         for (const double from_m : {-1.0, -0.4, 0.0, 0.6}) {
