@@ -153,9 +153,10 @@ std::string usual_dds_profile() {
     const char* const found = std::getenv(variable);
     return found != nullptr && found == value;
   };
-  const bool is_local =
-      is_set("ROS_LOCALHOST_ONLY", "1") || is_set("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST");
-  return is_local ? "host" : "lan";
+  // Humble's nodes then use the loopback interface alone; those from Iron on send no multicast, and
+  // look for processes on this machine only.
+  if (is_set("ROS_LOCALHOST_ONLY", "1")) return "host";
+  return is_set("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST") ? "no_multicast" : "lan";
 }
 
 DdsProfile read_dds_profile(const fs::path& file) {

@@ -32,8 +32,9 @@ struct DdsProfile {
 /// "HOST" or "HOST:PORT"; nothing when it is neither.
 [[nodiscard]] std::optional<dds::NetworkAddress> network_address_from(const std::string& text);
 
-/// The profile where none is chosen: host where the variables by which ROS 2 nodes stay on their
-/// machine say so (ROS_LOCALHOST_ONLY=1, ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST), else lan.
+/// The profile where none is chosen: by the variables with which ROS 2 nodes stay on their machine,
+/// host (ROS_LOCALHOST_ONLY=1) or no_multicast (ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST), which
+/// finds them; else lan.
 [[nodiscard]] std::string usual_dds_profile();
 
 /// What one deployment says: a profile, and what differs from it there.

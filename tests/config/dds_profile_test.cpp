@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <utility>
+#include <tuple>
 
 #include "tests/config/config_files.hpp"
 
@@ -68,10 +68,11 @@ TEST(DdsProfileFile, LanIsWhatHoldsWithoutAnyFile) {
 
 TEST(DdsProfileFile, OfThisMachineIsUsualWhereRosKeepsToIt) {
   EXPECT_EQ(DdsNetworkConfig().profile, "lan");
-  for (const auto& [variable, value] : {std::pair("ROS_LOCALHOST_ONLY", "1"),
-                                        std::pair("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")}) {
+  for (const auto& [variable, value, profile] :
+       {std::tuple("ROS_LOCALHOST_ONLY", "1", "host"),
+        std::tuple("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST", "no_multicast")}) {
     ASSERT_EQ(setenv(variable, value, 1), 0);
-    EXPECT_EQ(DdsNetworkConfig().profile, "host");
+    EXPECT_EQ(DdsNetworkConfig().profile, profile);
     ASSERT_EQ(setenv(variable, "0", 1), 0);
     EXPECT_EQ(DdsNetworkConfig().profile, "lan");
     ASSERT_EQ(unsetenv(variable), 0);
