@@ -73,9 +73,9 @@ struct OccupancyQuery {
   static constexpr std::size_t max_boxes = 100;
   static constexpr std::size_t max_rays = 1000;
   static constexpr std::uint32_t max_listed_voxels = 100'000;
-  /// Nodes of the octree that all boxes together may have: about half a second's work, in which
-  /// the octree does not grow.
-  static constexpr std::size_t max_box_nodes = 20'000'000;
+  /// Nodes of the octree that all boxes together may have: half a second's work to a second's, in
+  /// which the octree does not grow.
+  static constexpr std::size_t max_box_nodes = 10'000'000;
 
   /// One line for each limit that the request exceeds; empty when it can be answered.
   [[nodiscard]] std::string faults() const;
