@@ -41,7 +41,7 @@ struct VisibilityRule {
   /// It is hidden once this many scans saw through it, and this many for each scan that hit it.
   std::uint32_t misses_to_clear = 1;
   double misses_per_hit = 0.1;
-  /// Times as many of both for voxels that have a class.
+  /// Times as many of both for voxels that labels are sure of; of a building no more for each hit.
   std::uint32_t label_trust = 3;
 };
 
@@ -178,7 +178,10 @@ class LiveTile {
   std::size_t restore_excluded(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
                                const VisibilityRule& rule);
   [[nodiscard]] static VoxelHistory history(const LiveVoxel& voxel);
-  [[nodiscard]] static std::uint32_t trust_in(const LiveVoxel& voxel, const VisibilityRule& rule);
+  /// So many misses hide it, and so many for each hit.
+  [[nodiscard]] static std::uint32_t misses_to_clear(const LiveVoxel& voxel,
+                                                     const VisibilityRule& rule);
+  [[nodiscard]] static double misses_per_hit(const LiveVoxel& voxel, const VisibilityRule& rule);
   [[nodiscard]] static bool is_seen_through(const LiveVoxel& voxel, const VisibilityRule& rule);
   [[nodiscard]] static bool is_shown(const LiveVoxel& voxel, const VisibilityRule& rule);
   /// Nothing for voxels that are shown, or were hit too rarely to be.

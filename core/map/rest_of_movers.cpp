@@ -41,9 +41,13 @@ void LiveTile::for_each_neighbour(std::uint32_t key, Visit visit) const {
 
 bool LiveTile::is_of_mover(const LiveVoxel& voxel, std::int64_t mover_seen_ns,
                            const ScanStamps& stamps, const VisibilityRule& rule) const {
-  // Labels say what can move.
-  if (voxel.packed.evidence.winner() != SemanticClass::unlabeled || !is_shown(voxel, rule) ||
-      voxel.is_restored != 0 || voxel.packed.point_count == 0)
+  // Of a part of a mover labels are sure at times, too, and take it for a wall, a bush or a pole;
+  // hardly for ground.
+  const ClassEvidence& evidence = voxel.packed.evidence;
+  const bool is_surely_ground =
+      is_ground(evidence.winner()) && evidence.is_sure(voxel.packed.point_count);
+  if (is_surely_ground || !is_shown(voxel, rule) || voxel.is_restored != 0 ||
+      voxel.packed.point_count == 0)
     return false;
   const std::int64_t apart_ns = stamps.stamp_ns(voxel.last_scan) - mover_seen_ns;
   if (std::abs(apart_ns) > max_apart_ns ||

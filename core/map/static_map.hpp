@@ -32,7 +32,8 @@ struct StaticMapConfig {
   std::uint32_t misses_to_clear = 1;
   double misses_per_hit = 0.1;
   /// Times as many of both for voxels that have a class with a mean confidence of 0.7: of one that
-  /// cannot move, else they were not shown.
+  /// cannot move, else they were not shown. Of a building not as many for each hit: networks take
+  /// the sides of trams and buses for one, and are sure of it.
   std::uint32_t label_trust = 3;
   /// So many of those scans are kept: those that saw free space where a voxel is now, before it was
   /// hit for the first time, count as well.

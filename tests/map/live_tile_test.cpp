@@ -151,17 +151,18 @@ TEST(LiveTile, CountsTheMissesOfLaterScansAndOfThoseKeptBefore) {
 
 /// A mover that a network takes for a bush is seldom a sure one.
 TEST(LiveTile, OnlyASureClassTakesMoreMissesToClear) {
-  const auto shown_after = [](std::uint32_t misses, SemanticClass label, float confidence) {
+  const auto shown_after = [](std::uint32_t misses, SemanticClass label, float confidence,
+                              int hits = 3) {
     ScanStamps stamps;
     LiveTile tile(live_id, live_grid);
     TilePoint point = point_in(voxel_key({7, 8, 1}), label);
     point.confidence = confidence;
-    for (int i = 0; i < 3; ++i) tile.insert(std::array{point}, stamps.add(i));
+    for (int i = 0; i < hits; ++i) tile.insert(std::array{point}, stamps.add(i));
     const VisibilityTest test{.is_free = [](const Eigen::Vector3f&) { return true; },
                               .times_free_before = {},
                               .last_scan_cleared = 0};
     for (std::uint32_t miss = 0; miss < misses; ++miss)
-      (void)tile.clear_seen_through(test, stamps.add(10 + miss), rule);
+      (void)tile.clear_seen_through(test, stamps.add(hits + 10 + miss), rule);
     (void)tile.publish(1, rule, stamps);
     return !tile.record(rule, stamps).evidence->shown.empty();
   };
@@ -170,6 +171,11 @@ TEST(LiveTile, OnlyASureClassTakesMoreMissesToClear) {
   EXPECT_FALSE(shown_after(1, SemanticClass::vegetation, 0.6F));
   EXPECT_TRUE(shown_after(rule.label_trust - 1, SemanticClass::vegetation, 0.8F));
   EXPECT_FALSE(shown_after(rule.label_trust, SemanticClass::vegetation, 0.8F));
+  // A wall that few beams hit, and what was hit for long: that may be a tram that left.
+  EXPECT_TRUE(shown_after(rule.label_trust - 1, SemanticClass::building, 0.9F));
+  EXPECT_FALSE(shown_after(rule.label_trust, SemanticClass::building, 0.9F));
+  EXPECT_TRUE(shown_after(6, SemanticClass::fence, 0.9F, 31));
+  EXPECT_FALSE(shown_after(6, SemanticClass::building, 0.9F, 31));
 }
 
 TEST(LiveTile, OfAVoxelThatAFileExcludesTooTheVoxelStays) {
