@@ -1,7 +1,9 @@
 #include "core/mapper.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <span>
 #include <stdexcept>
 #include <utility>
@@ -50,6 +52,28 @@ MapperConfig checked(const MapperConfig& config) {
   if (const std::string faults = config.faults(); !faults.empty())
     throw std::invalid_argument(faults);
   return config;
+}
+
+/// Robots stand on slopes that are less steep.
+constexpr double max_doubtless_tilt_rad = std::numbers::pi / 3.0;
+
+double tilt_of(const Eigen::Vector3d& up) { return std::acos(std::clamp(up.z(), -1.0, 1.0)); }
+
+/// Whether the largest level face of a scan, which is the ground, is above the lidar by this `up`.
+bool has_floor_above(const Scan& scan, const Eigen::Vector3d& up_lidar) {
+  constexpr double layer_m = 0.2;
+  constexpr double max_height_m = 5.0;
+  constexpr int layers = static_cast<int>(max_height_m / layer_m);
+  /// A ceiling may be seen as well as the floor.
+  constexpr double clearly = 1.5;
+  std::array<std::size_t, layers> above{}, below{};
+  for (const Eigen::Vector3f& point : scan.points_lidar) {
+    const double height_m = point.cast<double>().dot(up_lidar);
+    const auto layer = static_cast<std::size_t>(std::abs(height_m) / layer_m);
+    if (layer > 0 && layer < above.size()) ++(height_m > 0.0 ? above : below).at(layer);
+  }
+  return static_cast<double>(std::ranges::max(above)) >
+         clearly * static_cast<double>(std::ranges::max(below));
 }
 
 }  // namespace
@@ -118,8 +142,7 @@ std::optional<MappedScan> Mapper::process(
   const std::optional<Scan> with_times = hands_out_scans_ ? std::optional(scan) : std::nullopt;
   const std::optional<InertialMotion> inertial = inertial_motion(scan.stamp_ns, sweep);
   odometry_.sweep_motion(sweep, inertial).move_to_middle(scan, sweep);
-  const auto T_odom_lidar_known =
-      in_odometry_frame(levelled(T_map_lidar_prior, scan.stamp_ns, sweep));
+  const auto T_odom_lidar_known = in_odometry_frame(levelled(T_map_lidar_prior, scan, sweep));
   const Eigen::Isometry3d T_map_lidar_expected =
       T_map_odom_ * T_odom_lidar_known.value_or(odometry_.predict(middle_ns, inertial));
   LabelSynchronizer::Labels labels = label_synchronizer_.labels_for(
@@ -205,16 +228,37 @@ std::optional<InertialMotion> Mapper::inertial_motion(std::int64_t stamp_ns,
 }
 
 std::optional<Eigen::Isometry3d> Mapper::levelled(
-    const std::optional<Eigen::Isometry3d>& T_map_lidar_prior, std::int64_t stamp_ns,
+    const std::optional<Eigen::Isometry3d>& T_map_lidar_prior, const Scan& scan,
     const SweepTimes& sweep) {
-  if (T_map_lidar_prior || !begins_map()) return T_map_lidar_prior;
-  if (!inertial_.has_samples()) return std::nullopt;
-  const UpDirection up =
-      inertial_.up_lidar(stamp_ns + std::llround((sweep.middle_s + 0.5 * sweep.duration_s) * 1e9));
+  if (!begins_map()) return T_map_lidar_prior;
+  const bool may_tell = inertial_.has_samples();
+  if (T_map_lidar_prior) {
+    if (may_tell) levelling_ = Levelling{.fault = "its first pose is given", .map = maps_begun_};
+    return T_map_lidar_prior;
+  }
+  if (!may_tell) return T_base_lidar_;
+  UpDirection up = inertial_.up_lidar(
+      scan.stamp_ns + std::llround((sweep.middle_s + 0.5 * sweep.duration_s) * 1e9));
+  if (up.up_lidar) up.fault = fault_of_up(*up.up_lidar, scan);
   levelling_ = Levelling{.fault = up.fault, .map = maps_begun_};
-  if (!up.up_lidar) return std::nullopt;
-  levelling_->tilt_rad = std::acos(std::clamp(up.up_lidar->z(), -1.0, 1.0));
-  return Eigen::Isometry3d(levelling_rotation(*up.up_lidar));
+  if (!up.up_lidar) return T_base_lidar_;
+  levelling_->tilt_rad = tilt_of(*up.up_lidar);
+  if (!up.fault.empty()) return T_base_lidar_;
+  const Eigen::Isometry3d T_base_lidar = T_base_lidar_.value_or(Eigen::Isometry3d::Identity());
+  return levelling_rotation(T_base_lidar.linear() * *up.up_lidar) * T_base_lidar;
+}
+
+std::string Mapper::fault_of_up(const Eigen::Vector3d& up_lidar, const Scan& scan) const {
+  const Eigen::Vector3d up =
+      T_base_lidar_ ? Eigen::Vector3d(T_base_lidar_->linear() * up_lidar) : up_lidar;
+  if (tilt_of(up) <= max_doubtless_tilt_rad) return "";
+  // A robot does not begin on its side. A lidar alone may hang from anything, above what it sees.
+  if (!T_base_lidar_ && !has_floor_above(scan, up_lidar)) return "";
+  return "by it the " + std::string(T_base_lidar_ ? "robot" : "lidar") + " leans by " +
+         std::to_string(std::lround(tilt_of(up) * 180.0 / std::numbers::pi)) + " degrees, and " +
+         (T_base_lidar_ ? "its mount" : "the ground in its scan") +
+         " says otherwise: its accelerations point down at rest (they must point up), or 'imu' in "
+         "the sensor's file is wrong";
 }
 
 void Mapper::teach_inertial(std::int64_t middle_ns, const Odometry::Step& step) {

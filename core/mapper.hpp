@@ -151,6 +151,9 @@ class Mapper {
   void set_mount(const Eigen::Isometry3d& T_base_lidar) {
     label_synchronizer_.set_mount(T_base_lidar);
   }
+  /// Maps begin with this frame of the robot at their origin, as it stands: level where an IMU
+  /// tells which way is up. Not where the first scan has a prior.
+  void begin_maps_at(const Eigen::Isometry3d& T_base_lidar) { T_base_lidar_ = T_base_lidar; }
   [[nodiscard]] std::shared_ptr<const MapSnapshot> map_snapshot() {
     return static_map_.map().view();
   }
@@ -237,8 +240,10 @@ class Mapper {
   [[nodiscard]] bool has_enough_points(const Scan& scan);
   /// The prior, or for the first scan of a new map the attitude that the IMU tells: map's z is up.
   [[nodiscard]] std::optional<Eigen::Isometry3d> levelled(
-      const std::optional<Eigen::Isometry3d>& T_map_lidar_prior, std::int64_t stamp_ns,
+      const std::optional<Eigen::Isometry3d>& T_map_lidar_prior, const Scan& scan,
       const SweepTimes& sweep);
+  /// What speaks against an IMU that says this is up; empty: nothing does.
+  [[nodiscard]] std::string fault_of_up(const Eigen::Vector3d& up_lidar, const Scan& scan) const;
   [[nodiscard]] std::optional<Eigen::Isometry3d> in_odometry_frame(
       const std::optional<Eigen::Isometry3d>& T_map_lidar) const;
   /// What odometry says in its own frame, in the map.
@@ -259,6 +264,8 @@ class Mapper {
   LabelSynchronizer label_synchronizer_;
   InertialTracker inertial_;
   std::optional<Levelling> levelling_;
+  /// Of maps to begin; nothing: the lidar is at their origin.
+  std::optional<Eigen::Isometry3d> T_base_lidar_;
   std::uint32_t maps_begun_ = 0;
   /// Of the last scan that was registered, in the middle of its sweep; in the odometry's frame.
   std::optional<StampedPose> last_middle_;

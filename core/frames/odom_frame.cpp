@@ -44,7 +44,7 @@ OdomPose OdomFrame::update(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map
       T_odom_base_ = orthonormal(T_odom_base_ * motion);
       if (interval_s > 0.0) velocity_ = twist_of(motion) / interval_s;
       extrapolated_s_ = 0.0;
-    } else if (motion_prior) {
+    } else if (motion_prior && is_prior_believed(*motion_prior, interval_s)) {
       T_odom_base_ = orthonormal(T_odom_base_ * *motion_prior);
       if (interval_s > 0.0) velocity_ = twist_of(*motion_prior) / interval_s;
       extrapolated_s_ = 0.0;
@@ -67,6 +67,15 @@ Eigen::Isometry3d OdomFrame::extrapolate(double interval_s) {
   extrapolated_s_ += going_on_s;
   if (extrapolated_s_ >= max_extrapolation_s) velocity_.reset();
   return motion;
+}
+
+bool OdomFrame::is_prior_believed(const Eigen::Isometry3d& motion_prior, double interval_s) {
+  const auto doubtful = std::exchange(doubtful_prior_, std::nullopt);
+  const PoseTangent last = velocity_.value_or(PoseTangent::Zero());
+  if (is_reachable(motion_prior, last, interval_s)) return true;
+  if (doubtful && is_reachable(motion_prior, *doubtful, interval_s)) return true;
+  if (interval_s > 0.0) doubtful_prior_ = twist_of(motion_prior) / interval_s;
+  return false;
 }
 
 // Once may be a pose that is wrong; twice the same is a robot that was pushed.

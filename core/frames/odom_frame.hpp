@@ -37,6 +37,8 @@ class OdomFrame {
   /// The motion that is expected where none is known.
   [[nodiscard]] Eigen::Isometry3d extrapolate(double interval_s);
   [[nodiscard]] bool is_believed(const Eigen::Isometry3d& motion, double interval_s);
+  /// Not where another odometry jumps.
+  [[nodiscard]] bool is_prior_believed(const Eigen::Isometry3d& motion_prior, double interval_s);
 
   std::optional<std::int64_t> last_stamp_ns_;
   Eigen::Isometry3d T_map_base_ = Eigen::Isometry3d::Identity();
@@ -50,6 +52,8 @@ class OdomFrame {
   bool is_connected_ = false;
   /// Of a motion that was not believed, a scan ago.
   std::optional<Eigen::Matrix<double, 6, 1>> doubtful_velocity_;
+  /// The same of the prior.
+  std::optional<Eigen::Matrix<double, 6, 1>> doubtful_prior_;
 };
 
 }  // namespace stillmap

@@ -60,7 +60,8 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
       corrector_(mapper_, map_limit_bytes_),
       imu_report_(statistics),
       frames_(config, outputs.static_transforms, statistics),
-      prior_(outputs.prior, frames_, config.frames.odom, statistics),
+      prior_(outputs.prior, frames_, config.frames.odom, config.mapper.sensor.motion_limits,
+             statistics),
       map_frame_(config.frames.map),
       odom_frame_(config.frames.odom) {
   const bool is_odom_own = config.frames.odom_source == FramesConfig::OdomSource::own;
@@ -169,6 +170,7 @@ void MappingThread::begin_map(SharedTrajectory trajectory,
   is_map_frozen_ = false;
   latest_map_.begin(mapper_.map_snapshot(), std::move(trajectory));
   if (odom_) odom_->begin_map();
+  prior_.forget_poses();
   if (outputs_.place_finder != nullptr) outputs_.place_finder->forget();
   begin_loops(&LoopCorrector::begin_in_map, seen_until_ns);
   if (outputs_.earth != nullptr) outputs_.earth->forget();
@@ -351,6 +353,7 @@ void MappingThread::map(QueuedScan queued) {
   if (use_sensor(sensor_of(queued)) && is_live_ && queue_.waiting() > 0)
     return drop({"sensor_told", "the network was made ready for the lidar of this scan"});
   mapper_.set_mount(frames_.T_base_lidar());
+  if (frames_.has_base()) mapper_.begin_maps_at(frames_.T_base_lidar());
   // A clock that is being set back: a correction, which tells times apart, is to meet none of after
   // that. Now no scan waits for it: none is mapped until the mapper believes the clock.
   if (corrector_.is_running() && steps_back_ >= steps_of_set_clock) end_correction();
@@ -438,21 +441,24 @@ std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns)
     mapper_.hand_out_scans(false);
   } else if (outputs_.place_finder != nullptr) {
     if (const auto T_map_lidar = outputs_.place_finder->relocate(mapper_, stamp_ns)) {
+      prior_.forget_poses();
       if (outputs_.loops != nullptr) set_elsewhere();
       return T_map_lidar;
     }
   }
+  if (mapper_.trajectory().empty()) {
+    const auto T_map_base_stored = latest_map_.pose_in_loaded_path(stamp_ns);
+    if (T_map_base_stored) return *T_map_base_stored * frames_.T_base_lidar();
+  }
+  // It begins where the robot stands, whichever way its lidar looks.
+  if (frames_.has_base() && mapper_.begins_map()) return std::nullopt;
   if (!mapper_.trajectory().empty()) {
     motion_prior_ = prior_.lidar_motion(mapper_.trajectory().back().stamp_ns, stamp_ns);
     if (motion_prior_) return mapper_.trajectory().back().T_map_lidar * *motion_prior_;
     if (!mapper_.is_placed()) return mapper_.trajectory().back().T_map_lidar;
     return std::nullopt;
   }
-  const auto T_map_base_stored = latest_map_.pose_in_loaded_path(stamp_ns);
-  if (T_map_base_stored) return *T_map_base_stored * frames_.T_base_lidar();
-  // A map begins where the robot stands, whichever way its lidar looks.
-  if (frames_.has_base()) return frames_.T_base_lidar();
-  return std::nullopt;
+  return frames_.has_base() ? std::optional(frames_.T_base_lidar()) : std::nullopt;
 }
 
 void MappingThread::stage_ended(std::string_view stage) {
@@ -465,6 +471,7 @@ void MappingThread::stage_ended(std::string_view stage) {
 
 void MappingThread::pose_found(std::int64_t stamp_ns, const OdometryResult& odometry) {
   const Eigen::Isometry3d T_lidar_base = frames_.T_base_lidar().inverse();
+  prior_.learn(mapper_.trajectory(), stamp_ns, odometry);
   RobotPose pose{
       .stamp_ns = stamp_ns,
       .T_map_base = T_map_base(odometry),

@@ -1,6 +1,9 @@
 #include "server/mapping/odometry_prior.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <utility>
 
@@ -19,6 +22,8 @@ constexpr std::int64_t max_gap_ns = 250'000'000;
 // No robot goes so far meanwhile.
 constexpr double max_carried_m = 0.2;
 constexpr double max_carried_m_s = 40.0;
+// No odometry is so late.
+constexpr double other_clock_s = 2.0;
 // The next pose of an odometry comes sooner.
 constexpr std::int64_t max_step_ns = 5'000'000'000;
 // So many poses in a row, each after the other, are of the odometry's clock, whatever the poses
@@ -110,8 +115,18 @@ OdometryPrior::OdometryPrior(dds::Participant& participant, const std::string& r
 
 void OdometryPrior::add(const nav_msgs::msg::Odometry& message) {
   const auto odometry = wire::from_odometry(message);
-  if (!odometry) return;
+  if (!odometry) {
+    statistics_.count("odometry_prior_not_usable");
+    const std::string fault =
+        "a message has an orientation that is none (such as 0 0 0 0), a number that is not finite, "
+        "or a stamp that is no time";
+    throttled_log_.warn("odometry_prior", "the odometry prior is not used: " + fault);
+    const std::scoped_lock lock(mutex_);
+    fault_ = fault;
+    return;
+  }
   const std::scoped_lock lock(mutex_);
+  fault_.clear();
   // tf2 knows none with a '/' at its front, which drivers of old send.
   const auto name = [](const std::string& frame) {
     return frame.substr(frame.starts_with('/') ? 1 : 0);
@@ -132,8 +147,29 @@ std::optional<PriorMotion> OdometryPrior::motion(std::int64_t from_ns, std::int6
   return PriorMotion{frame_, *T_before_after};
 }
 
+std::string OdometryPrior::silence_at(std::int64_t stamp_ns) const {
+  const std::scoped_lock lock(mutex_);
+  if (!fault_.empty()) return fault_;
+  const auto newest_ns = poses_.newest_ns();
+  if (!newest_ns) return "";
+  const double behind_s = 1e-9 * static_cast<double>(stamp_ns - *newest_ns);
+  if (std::abs(behind_s) < other_clock_s) {
+    return behind_s > 0.0 ? fmt::format(
+                                "its poses come too late: the newest is {:.2f} s older than "
+                                "the scan",
+                                behind_s)
+                          : "its poses begin after the last scan, or have a gap";
+  }
+  return fmt::format(
+      "its newest pose is {:.1f} s {} than the scan: it fell silent, or has another "
+      "clock",
+      std::abs(behind_s), behind_s > 0.0 ? "older" : "newer");
+}
+
 std::optional<PriorPose> OdometryPrior::pose_at(std::int64_t stamp_ns) const {
   const std::scoped_lock lock(mutex_);
+  // The next one is on its way, and an older one known.
+  if (poses_.newest_ns().value_or(stamp_ns) < stamp_ns) return std::nullopt;
   const auto T_odom_frame = poses_.pose_at(stamp_ns);
   if (!T_odom_frame) return std::nullopt;
   return PriorPose{odom_frame_, frame_, *T_odom_frame};

@@ -8,6 +8,7 @@
 #include "core/lidar/trajectory.hpp"
 #include "idl/dds/reader.hpp"
 #include "nav_msgs.h"
+#include "server/monitoring/log.hpp"
 #include "server/monitoring/statistics.hpp"
 #include "server/monitoring/unreadable_samples.hpp"
 #include "server/threads/periodic_worker.hpp"
@@ -32,6 +33,9 @@ class PoseBuffer {
   /// be on its way still, as the frame moved until then. Nothing when the poses do not reach that
   /// far.
   [[nodiscard]] std::optional<Eigen::Isometry3d> pose_at(std::int64_t stamp_ns) const;
+  [[nodiscard]] std::optional<std::int64_t> newest_ns() const {
+    return poses_.empty() ? std::nullopt : std::optional(poses_.back().stamp_ns);
+  }
 
  private:
   std::deque<StampedPose> poses_;
@@ -54,7 +58,8 @@ struct PriorPose {
 };
 
 /// Receives the odometry prior; poses that are left out are counted
-/// ("odometry_prior_out_of_order").
+/// ("odometry_prior_out_of_order"), and messages that hold none ("odometry_prior_not_usable"),
+/// which are also logged.
 class OdometryPrior {
  public:
   OdometryPrior(dds::Participant& participant, const std::string& ros_topic,
@@ -63,7 +68,12 @@ class OdometryPrior {
   /// Motion of the prior's child frame; nothing when the prior does not cover both times.
   [[nodiscard]] std::optional<PriorMotion> motion(std::int64_t from_ns, std::int64_t to_ns) const;
 
+  /// Interpolated; nothing after the newest pose.
   [[nodiscard]] std::optional<PriorPose> pose_at(std::int64_t stamp_ns) const;
+
+  /// Why it says nothing of this time; empty where no message has come yet, as there may be none to
+  /// come.
+  [[nodiscard]] std::string silence_at(std::int64_t stamp_ns) const;
 
  private:
   void add(const nav_msgs::msg::Odometry& message);
@@ -75,6 +85,9 @@ class OdometryPrior {
   std::string odom_frame_;
   std::string frame_;
   UnreadableSamples unreadable_;
+  /// What the last message was of no use for; empty: it was.
+  std::string fault_;
+  ThrottledLog throttled_log_;
   dds::Reader<nav_msgs::msg::Odometry> reader_;
   // Last: stops before what it uses is gone.
   PeriodicWorker worker_;

@@ -43,7 +43,7 @@ void PosePublisher::publish(const RobotPose& pose) {
                             turned_covariance(pose.covariance, T_map_odom.linear().transpose()),
                             odom_frame_, base, velocity);
     }
-  } else {
+  } else if (pose.is_odom_own) {
     transforms.push_back({map_frame_, base, pose.T_map_base});
   }
   message.tf = wire::to_tf(pose.stamp_ns, transforms);
@@ -58,7 +58,7 @@ void PosePublisher::write(const Message& message) {
   // Keep-last writers always have room.
   static_cast<void>(odometry_.write(message.odometry));
   if (message.local_odometry) static_cast<void>(local_odometry_->write(*message.local_odometry));
-  static_cast<void>(tf_.write(message.tf));
+  if (!message.tf.transforms().empty()) static_cast<void>(tf_.write(message.tf));
 }
 
 LabelledScanPublisher::LabelledScanPublisher(dds::Participant& participant,

@@ -24,7 +24,7 @@ struct RobotPose {
   /// Of (translation, rotation) in the map frame.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   std::string base_frame;
-  /// Where there is a frame odom.
+  /// Where there is a frame odom. Nothing of one that is not its own: nobody knows where that is.
   std::optional<OdomPose> odom;
   /// Whether base in odom is to be published; else somebody else does.
   bool is_odom_own = true;

@@ -66,9 +66,20 @@ TEST(OdomFrame, GoesOnSmoothlyWhereTheLostRobotIsFoundElsewhere) {
 
 TEST(OdomFrame, FollowsThePriorWhileLost) {
   OdomFrame frame = driven(20);
-  const Eigen::Isometry3d motion = from_xyz_rpy({0.1, 0.0, 0.0}, {0.0, 0.0, 0.02});
+  const Eigen::Isometry3d motion = from_xyz_rpy({0.8, 0.0, 0.0}, {0.0, 0.0, 0.02});
   const OdomPose pose = frame.update(20 * period_ns, on_road(19), lost, motion);
   EXPECT_TRUE(pose.T_odom_base.isApprox(on_road(19) * motion, 1e-9));
+}
+
+// Wheels that set themselves to the origin.
+TEST(OdomFrame, DoesNotJumpWithThePriorWhileLost) {
+  OdomFrame frame = driven(20);
+  const Eigen::Isometry3d jump = from_xyz_rpy({-12.5, 0.0, 0.0}, {0.0, 0.0, 0.3});
+  const OdomPose pose = frame.update(20 * period_ns, on_road(19), lost, jump);
+  EXPECT_NEAR(distance_m(pose.T_odom_base, on_road(20)), 0.0, 0.2);
+  const Eigen::Isometry3d motion = from_xyz_rpy({1.0, 0.0, 0.0}, {0.0, 0.0, 0.0});
+  const OdomPose next = frame.update(21 * period_ns, on_road(19), lost, motion);
+  EXPECT_TRUE(next.T_odom_base.isApprox(pose.T_odom_base * motion, 1e-6));
 }
 
 TEST(OdomFrame, StandsStillInALongGapWithoutAPose) {

@@ -11,6 +11,7 @@
 #include "idl/dds/writer.hpp"
 #include "idl/interface/topics.hpp"
 #include "tests/numbers.hpp"
+#include "tests/server/robot_drive.hpp"
 #include "tests/server/room_scans.hpp"
 #include "tests/server/server_process.hpp"
 
@@ -19,96 +20,6 @@ namespace {
 
 using namespace std::chrono_literals;
 using ::testing::HasSubstr;
-
-constexpr double deg = std::numbers::pi / 180.0;
-/// Of the odometry in a bare hall seen with 16 rings; a mount that is ignored is 15 times as much.
-constexpr double max_rotation_error_rad = 1.0 * deg;
-/// Of the room, beneath the lidar of room_pose().
-constexpr double ground_z_m = -1.5;
-
-/// A lidar 1.2 m ahead that looks down by 15 degrees.
-Eigen::Isometry3d tilted_mount() { return from_xyz_rpy({1.2, 0.1, 1.4}, {0.0, 15.0 * deg, 0.0}); }
-constexpr const char* tilted_mount_yaml = "mount: {xyz_m: [1.2, 0.1, 1.4], rpy_deg: [0, 15, 0]}\n";
-/// One that looks to the left, 1 m ahead.
-Eigen::Isometry3d turned_mount() { return from_xyz_rpy({1.0, 0.0, 1.5}, {0.0, 0.0, 90.0 * deg}); }
-constexpr const char* turned_mount_yaml = "mount: {xyz_m: [1, 0, 1.5], rpy_deg: [0, 0, 90]}\n";
-
-/// The robot on the ground of the room.
-Eigen::Isometry3d T_room_base(int index) {
-  return Eigen::Translation3d(0.0, 0.0, ground_z_m) * room_pose(index).T_map_lidar;
-}
-
-Scan mounted_scan(int index, const Eigen::Isometry3d& T_base_lidar) {
-  return seen_in_room({room_pose(index).stamp_ns, T_room_base(index) * T_base_lidar});
-}
-
-class Frames : public testing::Test {
- protected:
-  explicit Frames(const std::string& sensors = "sensor: vlp_16")
-      : setup_("every", "save_period_s: 3600", sensors) {}
-
-  void start(const std::string& yaml) {
-    setup_.add(yaml);
-    server_.emplace(setup_.server_arguments());
-    client_.emplace(setup_.client());
-    client_->wait_for_server(patience);
-    participant_.emplace(setup_.dds());
-    odometry_ = client_->subscribe_odometry([this](const OdometryUpdate& update) {
-      const std::scoped_lock lock(mutex_);
-      updates_.emplace(update.pose.stamp_ns, update);
-    });
-    publisher_.emplace(setup_.publisher(true));
-  }
-
-  void drive(int first, int last, const Eigen::Isometry3d& T_base_lidar) {
-    ASSERT_TRUE(publisher_->wait_for_subscriber(patience));
-    for (int i = first; i < last; ++i) {
-      ASSERT_TRUE(publisher_->publish(mounted_scan(i, T_base_lidar), {}, patience));
-    }
-  }
-
-  [[nodiscard]] std::map<std::int64_t, OdometryUpdate> updates(std::size_t count) {
-    EXPECT_TRUE(eventually([&] {
-      const std::scoped_lock lock(mutex_);
-      return updates_.size() >= count;
-    }));
-    const std::scoped_lock lock(mutex_);
-    return updates_;
-  }
-
-  void expect_poses_of_base(int scans) {
-    const auto poses = updates(static_cast<std::size_t>(scans));
-    const Eigen::Isometry3d T_start = T_room_base(0).inverse();
-    for (int i = 0; i < scans; ++i) {
-      const auto found = poses.find(room_pose(i).stamp_ns);
-      ASSERT_NE(found, poses.end()) << i;
-      const OdometryUpdate& update = found->second;
-      EXPECT_EQ(update.frame, "map");
-      EXPECT_EQ(update.child_frame, "base_link");
-      const Eigen::Isometry3d T_error =
-          (T_start * T_room_base(i)).inverse() * update.pose.T_map_lidar;
-      EXPECT_LT(T_error.translation().norm(), 0.1) << i;
-      EXPECT_LT(Eigen::AngleAxisd(T_error.linear()).angle(), max_rotation_error_rad) << i;
-    }
-  }
-
-  template <typename T>
-  [[nodiscard]] std::optional<T> sample(const dds::TopicSpec<T>& topic) {
-    dds::Reader<T> reader(*participant_, topic.dds_name, topic.reader);
-    T message;
-    return reader.take(message, {}, patience) ? std::optional(message) : std::nullopt;
-  }
-
-  ServiceSetup setup_;
-  dds::Topics topics_ = dds::Topics::in("stillmap");
-  std::optional<ServerProcess> server_;
-  std::optional<Client> client_;
-  std::optional<dds::Participant> participant_;
-  std::optional<ScanPublisher> publisher_;
-  std::mutex mutex_;
-  std::map<std::int64_t, OdometryUpdate> updates_;
-  Subscription odometry_;
-};
 
 TEST_F(Frames, PosesAreTheRobotsWhereverItsLidarSits) {
   start("frames: {base: base_link}\n" + std::string(tilted_mount_yaml));
@@ -265,107 +176,6 @@ TEST_F(Frames, AMapIsResumedByARobotWithAnotherMount) {
   expect_poses_of_base(15);
 }
 
-/// A scan that shows nothing: its pose is where it is expected.
-Scan empty_air(std::int64_t stamp_ns) {
-  Scan scan;
-  scan.stamp_ns = stamp_ns;
-  std::mt19937 random(7);
-  std::uniform_real_distribution<float> anywhere(-20.0F, 20.0F);
-  for (int i = 0; i < 3000; ++i) {
-    scan.points_lidar.emplace_back(anywhere(random), anywhere(random), 0.2F * anywhere(random));
-    scan.intensity.push_back(0.0F);
-    scan.ring.push_back(static_cast<std::uint16_t>(i % 16));
-  }
-  return scan;
-}
-
-class OdometryPriorFrames : public Frames {
- protected:
-  static constexpr int seen_scans = 12;
-
-  /// Wheels that say that the robot goes as in the room, and then ahead and round a curve.
-  static Eigen::Isometry3d T_wheels_base(int index) {
-    if (index < seen_scans) return T_room_base(index);
-    const Eigen::Isometry3d step = from_xyz_rpy({1.5, 0.0, 0.0}, {0.0, 0.0, 0.2});
-    return T_wheels_base(index - 1) * step;
-  }
-
-  /// Drives with all of the wheels' poses sent before every scan: the server's reader finds their
-  /// writer at some time, and leaves out what it has.
-  void drive_with_wheels(
-      int scans, const std::string& child_frame,
-      const Eigen::Isometry3d& T_wheels_after_reset = Eigen::Isometry3d::Identity(),
-      int poses = seen_scans + 2, const std::string& odom_frame = "wheel_odom") {
-    const auto topic = dds::odometry_prior_topic("odom_prior");
-    dds::Writer<nav_msgs::msg::Odometry> wheels(*participant_, topic.dds_name, {.depth = 100});
-    ASSERT_TRUE(wheels.readers().wait_for_any(patience));
-    // Once: what came earlier and comes again looks like a clock that was set back.
-    for (int i = 0; i < poses; ++i) {
-      const auto none = Eigen::Matrix<double, 6, 6>::Zero();
-      const Eigen::Isometry3d T =
-          i < seen_scans / 2 ? T_wheels_base(i) : T_wheels_after_reset * T_wheels_base(i);
-      ASSERT_TRUE(wheels.write(
-          wire::to_odometry({room_pose(i).stamp_ns, T}, none, odom_frame, child_frame)));
-    }
-    for (int scan = 0; scan < scans; ++scan) {
-      drive(scan, scan + 1, turned_mount());
-      ASSERT_TRUE(wait_for_scans(*client_, static_cast<std::uint64_t>(scan + 1)));
-    }
-  }
-};
-
-TEST_F(OdometryPriorFrames, MotionOfTheBasePredictsTheLidars) {
-  start("frames: {base: base_link}\n" + std::string(turned_mount_yaml));
-  drive_with_wheels(seen_scans, "base_link");
-  ASSERT_TRUE(publisher_->publish(empty_air(room_pose(seen_scans).stamp_ns), {}, patience));
-  const auto poses = updates(seen_scans + 1);
-  ASSERT_EQ(client_->status().health, OdometryHealth::lost);
-  const Eigen::Isometry3d T_last = poses.at(room_pose(seen_scans - 1).stamp_ns).pose.T_map_lidar;
-  const Eigen::Isometry3d T_now = poses.at(room_pose(seen_scans).stamp_ns).pose.T_map_lidar;
-  const Eigen::Isometry3d step =
-      T_wheels_base(seen_scans - 1).inverse() * T_wheels_base(seen_scans);
-  EXPECT_TRUE((T_last.inverse() * T_now).isApprox(step, 1e-6))
-      << (T_last.inverse() * T_now).matrix();
-  EXPECT_EQ(client_->status().counter("odometry_prior_unknown_frame"), 0U);
-}
-
-TEST_F(OdometryPriorFrames, WheelsThatHaveTheirOwnOdomGetOnlyItsPlaceInTheMap) {
-  start("frames: {base: base_link, odom: wheel_odom, odom_source: prior}\n" +
-        std::string(turned_mount_yaml));
-  dds::Reader<tf2_msgs::msg::TFMessage> tf(*participant_, topics_.tf.dds_name, topics_.tf.reader);
-  ASSERT_TRUE(tf.events().wait_for_writer(patience));
-  drive_with_wheels(seen_scans, "base_link");
-  std::vector<FrameTransform> last;
-  for (int i = 0; i < seen_scans; ++i) {
-    tf2_msgs::msg::TFMessage message;
-    ASSERT_TRUE(tf.take(message, {}, patience)) << i;
-    last = wire::from_tf(message);
-    ASSERT_EQ(last.size(), 1U);
-  }
-  EXPECT_EQ(last[0].parent, "map");
-  EXPECT_EQ(last[0].child, "wheel_odom");
-  // The wheels count from the middle of the room, the map from the first scan.
-  const Eigen::Isometry3d T_error = T_room_base(0) * last[0].T_parent_child;
-  EXPECT_LT(T_error.translation().norm(), 0.1);
-  EXPECT_LT(Eigen::AngleAxisd(T_error.linear()).angle(), 1.0 * deg);
-}
-
-TEST_F(OdometryPriorFrames, WheelsThatBeginAnewAreNotFollowed) {
-  start("frames: {base: base_link}\n" + std::string(turned_mount_yaml));
-  drive_with_wheels(seen_scans, "base_link", from_xyz_rpy({1e200, 0.0, 0.0}, {0.0, 0.0, 1.0}));
-  expect_poses_of_base(seen_scans);
-  EXPECT_EQ(client_->status().counter("odometry_prior_jumps"), 1U);
-  EXPECT_EQ(client_->status().dropped(), 0U);
-}
-
-TEST_F(OdometryPriorFrames, AFrameThatIsNowhereOnTheRobotIsRefused) {
-  start("frames: {base: base_link}\n" + std::string(turned_mount_yaml));
-  drive_with_wheels(seen_scans, "trailer");
-  expect_poses_of_base(seen_scans);
-  EXPECT_GE(client_->status().counter("odometry_prior_unknown_frame"), 1U);
-  EXPECT_EQ(client_->status().dropped(), 0U);
-}
-
 Eigen::Isometry3d rear_mount() {
   return from_xyz_rpy({-0.8, 0.2, 1.2}, {0.0, 10.0 * deg, 180.0 * deg});
 }
@@ -447,27 +257,6 @@ TEST_F(SeveralLidars, ACloudOfNoneOfThemIsRefused) {
   ASSERT_TRUE(stranger.publish(mounted_scan(0, rear_mount()), {}, patience));
   EXPECT_TRUE(eventually([&] { return client_->status().dropped("unknown_frame") == 1; }));
   EXPECT_THAT(client_->status().reason, HasSubstr("'camera'"));
-}
-
-TEST_F(OdometryPriorFrames, TheirOwnOdomStaysWhereItIsWhileTheNextPoseIsOnItsWay) {
-  start("frames: {base: base_link, odom: wheel_odom, odom_source: prior}\n" +
-        std::string(turned_mount_yaml));
-  dds::Reader<tf2_msgs::msg::TFMessage> tf(*participant_, topics_.tf.dds_name, topics_.tf.reader);
-  ASSERT_TRUE(tf.events().wait_for_writer(patience));
-  // The newest pose is of the last scan but one; frames are named as drivers of old did.
-  drive_with_wheels(seen_scans, "/base_link", Eigen::Isometry3d::Identity(), seen_scans - 1,
-                    "/wheel_odom");
-  std::vector<Eigen::Vector3d> origin_map;
-  for (int i = 0; i < seen_scans; ++i) {
-    tf2_msgs::msg::TFMessage message;
-    ASSERT_TRUE(tf.take(message, {}, patience)) << i;
-    const std::vector<FrameTransform> chain = wire::from_tf(message);
-    ASSERT_EQ(chain.size(), 1U);
-    EXPECT_EQ(chain[0].child, "wheel_odom");
-    origin_map.push_back(chain[0].T_parent_child.translation());
-  }
-  // The robot has gone 0.15 m since.
-  EXPECT_LT((origin_map.back() - origin_map.at(origin_map.size() - 2)).norm(), 0.08);
 }
 
 TEST_F(SeveralLidars, AreKnownByTheirFramesWithASlash) {

@@ -1,0 +1,72 @@
+#include "core/odometry/motion_trust.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace stillmap {
+namespace {
+
+/// What is borne of one motion: wheels slip a little, and stamps differ [m, rad].
+constexpr double borne_m = 0.1;
+constexpr double borne_rad = 0.02;
+/// Of older scans.
+constexpr double memory = 0.8;
+/// One scan says no more than this, however far off it is.
+constexpr double max_square = 25.0;
+/// It is believed again where it misses clearly less than it may.
+constexpr double regained_share = 0.5;
+/// Errors of poses that are no motion [m, rad].
+constexpr double noise_m = 0.1;
+constexpr double noise_rad = 0.02;
+
+double square_of(const Eigen::Isometry3d& missed) {
+  const double angle_rad = Eigen::AngleAxisd(missed.linear()).angle();
+  return std::min(max_square, missed.translation().squaredNorm() / (borne_m * borne_m) +
+                                  angle_rad * angle_rad / (borne_rad * borne_rad));
+}
+
+}  // namespace
+
+bool MotionTrust::is_reachable(const Motion& last, const Eigen::Isometry3d& motion,
+                               double interval_s) const {
+  const double between_middles_s = 0.5 * (interval_s + last.interval_s);
+  const Eigen::Vector3d expected_m =
+      last.T_before_after.translation() * (interval_s / last.interval_s);
+  return (motion.translation() - expected_m).norm() <=
+         limits_.max_acceleration_m_s2 * between_middles_s * interval_s + noise_m;
+}
+
+bool MotionTrust::is_possible(const Eigen::Isometry3d& foretold, double interval_s) {
+  foretold_.reset();
+  if (!(interval_s > 0.0)) return true;
+  const auto last_foretold = std::exchange(last_foretold_, Motion{foretold, interval_s});
+  const bool is_known = registered_ || last_foretold;
+  const bool is_within =
+      foretold.translation().norm() <= limits_.max_speed_m_s * interval_s + noise_m &&
+      Eigen::AngleAxisd(foretold.linear()).angle() <=
+          limits_.max_turn_rate_rad_s * interval_s + noise_rad;
+  const bool goes_on = !is_known ||
+                       (registered_ && is_reachable(*registered_, foretold, interval_s)) ||
+                       (last_foretold && is_reachable(*last_foretold, foretold, interval_s));
+  if (!is_within || !goes_on) return false;
+  foretold_ = foretold;
+  return true;
+}
+
+void MotionTrust::learn(const Eigen::Isometry3d& registered, double interval_s) {
+  if (!(interval_s > 0.0)) return;
+  const auto last = std::exchange(registered_, Motion{registered, interval_s});
+  const auto foretold = std::exchange(foretold_, std::nullopt);
+  if (!foretold || !last) return;
+  const auto forget = [](double& mean, double square) {
+    mean = memory * mean + (1.0 - memory) * square;
+  };
+  Eigen::Isometry3d repeated = last->T_before_after;
+  repeated.translation() *= interval_s / last->interval_s;
+  forget(missed_, square_of(foretold->inverse() * registered));
+  forget(missed_by_repetition_, square_of(repeated.inverse() * registered));
+  const double borne = std::max(1.0, missed_by_repetition_);
+  is_believed_ = missed_ <= (is_believed_ ? borne : regained_share * borne);
+}
+
+}  // namespace stillmap
