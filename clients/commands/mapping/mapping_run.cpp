@@ -46,6 +46,8 @@ class MappingRun {
         imu_(dataset.imu()),
         period_s_(config.sensor.period_s) {
     mapper_.reset(new_map_id());
+    if (!T_body_lidar_.isApprox(Eigen::Isometry3d::Identity()))
+      mapper_.begin_maps_at(T_body_lidar_);
     if (loops) loops_.emplace(*loops, config.sensor);
   }
 
@@ -85,12 +87,9 @@ class MappingRun {
       mapper_.add(sample);
     times_.begin();
     std::optional<Eigen::Isometry3d> T_map_lidar_first;
-    const bool is_mounted = !T_body_lidar_.isApprox(Eigen::Isometry3d::Identity());
     // Until the lidar is found in the earlier map, every scan is looked for where that ended.
     if (!earlier_.empty() && !is_registered_) {
       T_map_lidar_first = earlier_.back().T_map_lidar * T_body_lidar_;
-    } else if (earlier_.empty() && !mapper_.is_placed() && is_mounted) {
-      T_map_lidar_first = T_body_lidar_;
     }
     const std::optional<MappedScan> mapped =
         mapper_.process(std::move(frame->scan), T_map_lidar_first);
