@@ -47,6 +47,7 @@ TEST_F(LocalizeCommandTest, FindsScansWhereTheMapperHadThem) {
     EXPECT_LT(std::hypot(found[0] - expected[0], found[1] - expected[1], found[2] - expected[2]),
               0.2);
     EXPECT_GT(scan.at("score"), scan.at("runner_up_score"));
+    EXPECT_EQ(scan.at("sweep_motion"), "no times");
     EXPECT_GT(scan.at("ms"), 0.0);
   }
 }

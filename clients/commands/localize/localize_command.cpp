@@ -20,7 +20,10 @@
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/dataset/dataset_error.hpp"
+#include "core/lidar/rings.hpp"
 #include "core/localization/localizer.hpp"
+#include "core/localization/lone_scan.hpp"
+#include "core/localization/scan_follower.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/picture/map_picture.hpp"
 
@@ -49,7 +52,7 @@ struct LocalizeArguments {
 struct LocalizedScan {
   std::size_t index = 0;
   std::int64_t stamp_ns = 0;
-  LocalizationResult result;
+  StampedLocalization found;
   double ms = 0.0;
 };
 
@@ -91,19 +94,27 @@ class LocalizationRun {
         config_(mapper_config(arguments.mapper, dataset.suggested_sensor())),
         T_body_lidar_(body_of(arguments.mount, arguments.mapper.config_file).T_body_lidar),
         segmenter_(make_segmenter(labels_of(arguments.mapper, dataset), dataset, T_body_lidar_)),
+        follower_(config_.odometry, config_.sensor,
+                  [this](std::size_t index) { return read_beside(index); }),
         is_strict_(arguments.range.strict) {}
 
   /// Nothing for a scan that cannot be read; why is said.
   std::optional<LocalizedScan> localize(std::size_t index, Progress& progress) {
     try {
-      Scan scan = drop_unusable_points(dataset_.read(index).scan, config_.prepare);
-      turn_up(scan, config_.sensor.elevation_offset);
-      LocalizedScan localized{index, scan.stamp_ns, {}, 0.0};
+      const Scan scan = prepared(index);
+      LocalizedScan localized{.index = index, .stamp_ns = scan.stamp_ns, .found = {}};
       const auto began = Clock::now();
       const PointLabels labels = segmenter_->segment(scan);
-      localized.result = localizer_.localize(scan, labels, T_body_lidar_.linear());
+      const Eigen::Matrix3d R_body_lidar = T_body_lidar_.linear();
+      if (const auto at_stamp = follower_.at_stamp(index, scan)) {
+        localized.found = {localizer_.localize(*at_stamp, labels, R_body_lidar),
+                           SweepMotionSource::scans_before};
+      } else {
+        localized.found =
+            localize_lone_scan(localizer_, scan, labels, R_body_lidar, config_.sensor.period_s);
+      }
       localized.ms = milliseconds_since(began);
-      for (PlaceHypothesis& place : localized.result.places)
+      for (PlaceHypothesis& place : localized.found.result.places)
         place.T_map_lidar = place.T_map_lidar * T_body_lidar_.inverse();
       return localized;
     } catch (const DatasetError& error) {
@@ -119,11 +130,31 @@ class LocalizationRun {
   [[nodiscard]] std::size_t skipped() const { return skipped_; }
 
  private:
+  /// As the mapper does before it registers a scan. Throws DatasetError.
+  [[nodiscard]] Scan prepared(std::size_t index) const {
+    Scan raw = dataset_.read(index).scan;
+    if (follower_.uses_rings()) raw.ring = assign_rings(raw, config_.sensor);
+    Scan scan = drop_unusable_points(std::move(raw), config_.prepare);
+    turn_up(scan, config_.sensor.elevation_offset);
+    if (!config_.prepare.deskew) scan.time_offset_s.clear();
+    return scan;
+  }
+  /// For the motion of the one that is looked for.
+  [[nodiscard]] std::optional<Scan> read_beside(std::size_t index) const {
+    if (index >= dataset_.size()) return std::nullopt;
+    try {
+      return prepared(index);
+    } catch (const DatasetError&) {
+      return std::nullopt;  // it is named where it is looked for itself
+    }
+  }
+
   const ScanDataset& dataset_;
   const Localizer& localizer_;
   MapperConfig config_;
   Eigen::Isometry3d T_body_lidar_;
   std::unique_ptr<Segmenter> segmenter_;
+  ScanFollower follower_;
   bool is_strict_;
   std::size_t skipped_ = 0;
 };
@@ -148,14 +179,16 @@ double score_of(const LocalizationResult& result, std::size_t place) {
 }
 
 Json to_json(const LocalizedScan& scan) {
-  const bool is_found = scan.result.status == LocalizationStatus::found;
-  Json json{{"scan", scan.index},
-            {"stamp_ns", scan.stamp_ns},
-            {"status", name(scan.result.status)},
-            {"pose", is_found ? place_json(scan.result.places.front().T_map_lidar) : Json(nullptr)},
-            {"score", score_of(scan.result, 0)},
-            {"runner_up_score", score_of(scan.result, 1)},
-            {"ms", scan.ms}};
+  const bool is_found = scan.found.result.status == LocalizationStatus::found;
+  Json json{
+      {"scan", scan.index},
+      {"stamp_ns", scan.stamp_ns},
+      {"status", name(scan.found.result.status)},
+      {"pose", is_found ? place_json(scan.found.result.places.front().T_map_lidar) : Json(nullptr)},
+      {"score", score_of(scan.found.result, 0)},
+      {"runner_up_score", score_of(scan.found.result, 1)},
+      {"sweep_motion", name(scan.found.motion)},
+      {"ms", scan.ms}};
   return json;
 }
 
@@ -173,7 +206,7 @@ Json to_json(const std::vector<LocalizedScan>& scans, std::size_t skipped,
   std::size_t found = 0;
   for (const LocalizedScan& scan : scans) {
     list.push_back(to_json(scan));
-    if (scan.result.status == LocalizationStatus::found) ++found;
+    if (scan.found.result.status == LocalizationStatus::found) ++found;
   }
   return {{"map",
            {{"map_id", map.saved.view.map_id},
@@ -192,17 +225,17 @@ std::string describe(const std::vector<LocalizedScan>& scans, std::size_t skippe
   Table table({"scan", "", "x", "y", "z", "heading", "score", "runner-up", "ms"});
   std::size_t found = 0;
   for (const LocalizedScan& scan : scans) {
-    std::vector<std::string> row{std::to_string(scan.index), name(scan.result.status)};
-    if (scan.result.status == LocalizationStatus::found) {
+    std::vector<std::string> row{std::to_string(scan.index), name(scan.found.result.status)};
+    if (scan.found.result.status == LocalizationStatus::found) {
       ++found;
-      const Eigen::Isometry3d& T = scan.result.places.front().T_map_lidar;
+      const Eigen::Isometry3d& T = scan.found.result.places.front().T_map_lidar;
       for (int axis = 0; axis < 3; ++axis) row.push_back(fixed(T.translation()[axis], 2));
       row.push_back(fixed(heading_deg(T), 1));
     } else {
       row.insert(row.end(), 4, "-");
     }
-    row.insert(row.end(), {fixed(score_of(scan.result, 0), 2), fixed(score_of(scan.result, 1), 2),
-                           fixed(scan.ms, 0)});
+    row.insert(row.end(), {fixed(score_of(scan.found.result, 0), 2),
+                           fixed(score_of(scan.found.result, 1), 2), fixed(scan.ms, 0)});
     table.add(row);
   }
   return table.text() + std::to_string(found) + " of " + std::to_string(scans.size()) +
@@ -211,13 +244,26 @@ std::string describe(const std::vector<LocalizedScan>& scans, std::size_t skippe
          " ms, made searchable in " + fixed(map.index_ms, 0) + " ms\n";
 }
 
+/// Where the motion is not known, the pose may be as far off as the lidar moved in its sweep.
+std::string motion_warning(const std::vector<LocalizedScan>& scans) {
+  const auto count = std::ranges::count_if(scans, [](const LocalizedScan& scan) {
+    return scan.found.result.status == LocalizationStatus::found &&
+           scan.found.motion == SweepMotionSource::unknown;
+  });
+  if (count == 0) return {};
+  return "stillmap: nothing tells how the lidar moved during the sweep of " +
+         std::to_string(count) +
+         " of the scans that were found (sweep_motion of --json): where it "
+         "did, their poses are of some moment of it, not of their stamps\n";
+}
+
 /// The map with a mark for each pose that was found.
 void write_picture(const std::string& file, const std::vector<LocalizedScan>& scans,
                    const SearchableMap& map) {
   Trajectory found;
   for (const LocalizedScan& scan : scans) {
-    if (scan.result.status == LocalizationStatus::found)
-      found.push_back({scan.stamp_ns, scan.result.places.front().T_map_lidar});
+    if (scan.found.result.status == LocalizationStatus::found)
+      found.push_back({scan.stamp_ns, scan.found.result.places.front().T_map_lidar});
   }
   MapPictureOptions options;
   options.looked_for = scans.size();
@@ -240,6 +286,7 @@ ExitCode run(const LocalizeArguments& arguments) {
     if (auto scan = run.localize(index, progress)) scans.push_back(*std::move(scan));
     progress.update((index - arguments.range.first) / step + 1);
   }
+  std::cerr << motion_warning(scans);
   if (!arguments.picture.empty()) write_picture(arguments.picture, scans, map);
   std::cout << (arguments.json ? to_json(scans, run.skipped(), map).dump(2) + "\n"
                                : describe(scans, run.skipped(), map));
@@ -283,8 +330,10 @@ void add_localize_command(CommandHandle program, Action& action) {
       "map explains the scan, the scan sees what the map has there, and no other place comes near\n"
       "that. With --labels auto scans without labels are looked for by their geometry alone, and "
       "no\n"
-      "network runs. The score is the product of both shares; runner-up is that of the next best "
-      "place.\n"
+      "network runs. Where points have times, the pose is that at the scan's stamp: the scans\n"
+      "before it tell how the lidar moved during its sweep, else the map does; sweep_motion of\n"
+      "--json says which, or that none did (unknown). The score is the product of both shares;\n"
+      "runner-up is that of the next best place.\n"
       "Exit code 0 however many are found: 'found' of --json tells.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+
+#include "core/lidar/labelled_scan.hpp"
+#include "core/lidar/prepare.hpp"
+#include "core/localization/localizer.hpp"
+
+namespace stillmap {
+
+/// What tells how the lidar moved within the sweep of a scan.
+enum class SweepMotionSource : std::uint8_t {
+  /// The points have no times: the scan is compensated already, or was measured at one instant.
+  no_times,
+  /// The scans before it (ScanFollower).
+  scans_before,
+  /// The map that it was found in.
+  map,
+  /// Nothing: the points are as they were measured.
+  unknown,
+};
+/// "no times", "scans before", "map", "unknown".
+[[nodiscard]] const char* name(SweepMotionSource source);
+
+/// Motion of the lidar from the start to the end of a sweep, told by a map: what was measured in
+/// the first half of the sweep and in the second one is registered each for itself, from a pose
+/// within a metre of that in the middle, and the halves' poses are half a sweep apart. Nothing
+/// where a half is not believed there, or where the halves come to no steady motion.
+[[nodiscard]] std::optional<Eigen::Isometry3d> sweep_motion_in_map(
+    const Localizer& localizer, const Scan& scan, const PointLabels& labels,
+    const SweepTimes& sweep, const Eigen::Matrix3d& R_body_lidar,
+    const Eigen::Isometry3d& T_map_lidar);
+
+/// Where a scan is in a map, and what told its motion.
+struct StampedLocalization {
+  LocalizationResult result;
+  SweepMotionSource motion = SweepMotionSource::no_times;
+};
+
+/// Finds a prepared scan beside which there is no other one. Where its points have times, the pose
+/// is that at its stamp, as far as the map tells the motion. Throws what the localizer does.
+[[nodiscard]] StampedLocalization localize_lone_scan(const Localizer& localizer, const Scan& scan,
+                                                     const PointLabels& labels,
+                                                     const Eigen::Matrix3d& R_body_lidar,
+                                                     double period_s);
+
+}  // namespace stillmap
