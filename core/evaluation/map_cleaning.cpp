@@ -5,8 +5,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/lidar/semantic_class.hpp"
-
 namespace stillmap::evaluation {
 namespace {
 
@@ -75,12 +73,15 @@ void MapTruth::add(std::span<const Eigen::Vector3f> points_map,
     Voxel& voxel = voxels_[key(cell_of(points_map[i], voxel_size_m_))];
     const std::uint32_t before = voxel.moving_points + voxel.parked_points + voxel.fixed_points;
     voxel.mean_map += (points_map[i] - voxel.mean_map) / static_cast<float>(before + 1);
+    const SemanticClass label = class_from_semantic_kitti(original_ids[i]);
     if (is_moving_semantic_kitti(original_ids[i])) {
       voxel.moving_points += 1;
-    } else if (is_movable(class_from_semantic_kitti(original_ids[i]))) {
+    } else if (is_movable(label)) {
       voxel.parked_points += 1;
     } else {
       voxel.fixed_points += 1;
+      for (std::size_t k = 0; k < thin_classes.size(); ++k)
+        voxel.thin_points[k] += label == thin_classes[k] ? 1 : 0;
     }
   }
 }
@@ -94,6 +95,10 @@ std::vector<MapTruth::Voxel> MapTruth::voxels() const {
 
 std::optional<double> MapCleaningScore::preservation_rate() const {
   return ratio(fixed_kept, fixed_voxels);
+}
+
+std::optional<double> MapCleaningScore::thin_preservation_rate(std::size_t i) const {
+  return ratio(thin_kept.at(i), thin_voxels.at(i));
 }
 
 std::optional<double> MapCleaningScore::preservation_rate_with_parked() const {
@@ -129,6 +134,11 @@ MapCleaningScore map_cleaning_score(const MapTruth& truth,
     } else {
       score.fixed_voxels += 1;
       score.fixed_kept += kept;
+      for (std::size_t k = 0; k < thin_classes.size(); ++k) {
+        if (2 * voxel.thin_points[k] <= voxel.fixed_points) continue;
+        score.thin_voxels[k] += 1;
+        score.thin_kept[k] += kept;
+      }
     }
   }
   return score;

@@ -216,6 +216,9 @@ TEST_F(EvaluateCommandTest, ScoresAMapAgainstTheRecordingItWasMadeFrom) {
   EXPECT_GT(json.at("preservation_rate"), 0.3);
   EXPECT_LE(json.at("preservation_rate"), 1.0);
   EXPECT_GT(json.at("fixed_voxels"), 1000);
+  EXPECT_GT(json.at("thin").at("pole").at("voxels"), 0);
+  EXPECT_LE(json.at("thin").at("fence").at("voxels_kept"),
+            json.at("thin").at("fence").at("voxels"));
 }
 
 TEST_F(EvaluateCommandTest, TakesTheMotionOutOfTheScansThatAMapIsScoredAgainst) {

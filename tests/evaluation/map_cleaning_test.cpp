@@ -63,6 +63,27 @@ TEST(MapCleaningScore, RatesWhatIsKeptOfEachKind) {
   EXPECT_DOUBLE_EQ(score.parked_rejection_rate().value(), 1.0);
 }
 
+TEST(MapCleaningScore, TellsThinThingsApart) {
+  constexpr std::uint16_t fence_id = 51, pole_id = 80;
+  MapTruth truth;
+  truth.add(Points{{0.1F, 0.1F, 0.1F},
+                   {5.1F, 0.1F, 0.1F},
+                   {10.1F, 0.1F, 0.1F},
+                   {15.1F, 0.1F, 0.1F},
+                   {15.1F, 0.1F, 0.1F}},
+            Ids{fence_id, fence_id, pole_id, pole_id, road_id});
+  const MapCleaningScore score = map_cleaning_score(truth, Points{{0.15F, 0.1F, 0.1F}});
+  EXPECT_EQ(score.fixed_voxels, 4U);
+  for (std::size_t i = 0; i < thin_classes.size(); ++i) {
+    SCOPED_TRACE(name(thin_classes.at(i)));
+    const bool is_fence = thin_classes.at(i) == SemanticClass::fence;
+    const bool is_pole = thin_classes.at(i) == SemanticClass::pole;
+    EXPECT_EQ(score.thin_voxels.at(i), is_fence ? 2U : is_pole ? 1U : 0U) << "half road is none";
+    EXPECT_EQ(score.thin_kept.at(i), is_fence ? 1U : 0U);
+    EXPECT_EQ(score.thin_preservation_rate(i).has_value(), is_fence || is_pole);
+  }
+}
+
 TEST(MapCleaningScore, AnEmptyMapRejectsEverythingAndPreservesNothing) {
   MapTruth truth;
   truth.add(Points{{0, 0, 0}, {9, 9, 9}}, Ids{road_id, moving_car_id});

@@ -110,6 +110,13 @@ Json to_json(const evaluation::MapCleaningScore& score, const EvaluateMapArgumen
   const auto number = [](const std::optional<double>& value) {
     return value ? Json(*value) : Json(nullptr);
   };
+  Json thin = Json::object();
+  for (std::size_t i = 0; i < evaluation::thin_classes.size(); ++i) {
+    thin.set(name(evaluation::thin_classes.at(i)),
+             {{"voxels", score.thin_voxels.at(i)},
+              {"voxels_kept", score.thin_kept.at(i)},
+              {"preservation_rate", number(score.thin_preservation_rate(i))}});
+  }
   return {{"preservation_rate", number(score.preservation_rate())},
           {"preservation_rate_with_parked", number(score.preservation_rate_with_parked())},
           {"rejection_rate", number(score.rejection_rate())},
@@ -119,6 +126,7 @@ Json to_json(const evaluation::MapCleaningScore& score, const EvaluateMapArgumen
           {"parked_voxels", score.parked_voxels},
           {"moving_voxels", score.moving_voxels},
           {"moving_voxels_kept", score.moving_kept},
+          {"thin", thin},
           {"voxel_size_m", arguments.voxel_size_m},
           {"poses", arguments.poses}};
 }
@@ -130,6 +138,12 @@ std::string describe(const evaluation::MapCleaningScore& score) {
   Table table({"against the labelled truth", "voxels", "in the map", "%"});
   table.add({"fixed: preservation rate", std::to_string(score.fixed_voxels),
              std::to_string(score.fixed_kept), percent(score.preservation_rate())});
+  for (std::size_t i = 0; i < evaluation::thin_classes.size(); ++i) {
+    if (score.thin_voxels.at(i) == 0) continue;
+    table.add({"  of these " + std::string(name(evaluation::thin_classes.at(i))),
+               std::to_string(score.thin_voxels.at(i)), std::to_string(score.thin_kept.at(i)),
+               percent(score.thin_preservation_rate(i))});
+  }
   table.add({"parked, left out by design", std::to_string(score.parked_voxels),
              std::to_string(score.parked_kept), ""});
   table.add({"fixed and parked (as ERASOR counts)",
@@ -186,7 +200,9 @@ void add_evaluate_map_command(CommandHandle evaluate, Action& action) {
       "Example:\n"
       "  stillmap evaluate map --truth city --map city_map/map.stillmap\n"
       "As in ERASOR (RA-L 2021): a true voxel counts as kept when a map point lies within half\n"
-      "its diagonal. Parked vehicles are counted apart: the planning map leaves them out.");
+      "its diagonal. Parked vehicles are counted apart: the planning map leaves them out. Of what\n"
+      "is fixed, things thinner than a voxel are told apart as well (thin of --json): rays pass\n"
+      "beside them, and cleaning takes them first.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
