@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <numbers>
 
@@ -177,6 +178,22 @@ bool RangeImageView::sees_past(const Observation& point, float range_m) const {
     if (!column_sees_past(at, left, range_m) || !column_sees_past(at, right, range_m)) return false;
   }
   return true;
+}
+
+bool RangeImageView::has_beam_near(const Observation& point, float distance_m) const {
+  const Direction& at = point.at;
+  const auto parts_of_row = [](int row, std::uint8_t below_top) { return 256 * row + below_top; };
+  const float parts_per_m = 256.0F * rows_per_rad_ / point.point_range_m;
+  const float most = distance_m * parts_per_m;
+  const int own = parts_of_row(at.row, at.below_row_top);
+  for (int row = std::max(0, at.row - 1); row <= std::min(rows_ - 1, at.row + 1); ++row) {
+    for (int offset = -1; offset <= 1; ++offset) {
+      const std::size_t pixel = index(row, (at.column + offset + columns_) % columns_);
+      const int away = std::abs(parts_of_row(row, below_row_top_[pixel]) - own);
+      if (pixels_[pixel] != 0.0F && static_cast<float>(away) <= most) return true;
+    }
+  }
+  return false;
 }
 
 std::optional<RangeImageView::Observation> RangeImageView::observe(

@@ -42,6 +42,10 @@ class RangeImageView {
   /// above and below it, as far to the sides as rows are apart, one column at least.
   [[nodiscard]] bool sees_past(const Observation& point, float range_m) const;
 
+  /// Whether one of the beams that measured something round a point goes past it nearer than this
+  /// [m], up or down, and not only on either side of it.
+  [[nodiscard]] bool has_beam_near(const Observation& point, float distance_m) const;
+
   [[nodiscard]] const Eigen::Vector3f& origin_map() const { return origin_map_; }
 
   /// Replaces the pose.

@@ -62,6 +62,12 @@ struct Rgb {
          label == SemanticClass::terrain;
 }
 
+/// Fence, trunk, pole, traffic-sign: often thinner than beams are apart.
+[[nodiscard]] constexpr bool is_thin(SemanticClass label) {
+  return label == SemanticClass::fence || label == SemanticClass::trunk ||
+         label == SemanticClass::pole || label == SemanticClass::traffic_sign;
+}
+
 /// Whether any of them is a class. Fields that nobody filled hold zeros: those are no labels.
 [[nodiscard]] bool has_known_class(std::span<const SemanticClass> labels);
 

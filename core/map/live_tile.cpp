@@ -205,8 +205,9 @@ bool LiveTile::clear_seen_through(const VisibilityTest& test, std::uint32_t scan
     const bool is_new = voxel.first_scan > test.last_scan_cleared && test.times_free_before;
     if (voxel.last_scan == scan && !is_new) return;
     const Eigen::Vector3f position_map = mean_map(voxel);
-    std::uint32_t misses = is_new ? test.times_free_before(position_map) : 0;
-    if (voxel.last_scan != scan && test.is_free(position_map)) ++misses;
+    const bool is_thin = is_surely_thin(voxel);
+    std::uint32_t misses = is_new ? test.times_free_before(position_map, is_thin) : 0;
+    if (voxel.last_scan != scan && test.is_free(position_map, is_thin)) ++misses;
     if (misses == 0) return;
     const bool was_hidden = is_seen_through(voxel, rule);
     const bool was_rest = voxel.misses == misses_of_rest;

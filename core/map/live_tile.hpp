@@ -45,12 +45,13 @@ struct VisibilityRule {
   std::uint32_t label_trust = 3;
 };
 
-/// Whether scans saw through a position of the map frame [m].
+/// Whether scans saw through a position of the map frame [m]. Of what is thin (is_thin) a ray must
+/// have gone through the place itself: those on either side of it tell nothing.
 struct VisibilityTest {
   /// A ray of this scan passed it.
-  std::function<bool(const Eigen::Vector3f& position_map)> is_free;
+  std::function<bool(const Eigen::Vector3f& position_map, bool is_thin)> is_free;
   /// How many of the scans before it did, of those that are kept; empty: none are.
-  std::function<std::uint32_t(const Eigen::Vector3f& position_map)> times_free_before;
+  std::function<std::uint32_t(const Eigen::Vector3f& position_map, bool is_thin)> times_free_before;
   /// Voxels that no scan hit until this one are asked how often they were free before.
   std::uint32_t last_scan_cleared = 0;
   /// Those of the tile's scans; null: what is hidden says nothing of what is beside it.
@@ -178,6 +179,8 @@ class LiveTile {
   std::size_t restore_excluded(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
                                const VisibilityRule& rule);
   [[nodiscard]] static VoxelHistory history(const LiveVoxel& voxel);
+  /// Whether labels are sure that it is something thin.
+  [[nodiscard]] static bool is_surely_thin(const LiveVoxel& voxel);
   /// So many misses hide it, and so many for each hit.
   [[nodiscard]] static std::uint32_t misses_to_clear(const LiveVoxel& voxel,
                                                      const VisibilityRule& rule);

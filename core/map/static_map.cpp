@@ -106,10 +106,10 @@ struct StaticMap::State {
     return {config.min_points, config.misses_to_clear, config.misses_per_hit, config.label_trust};
   }
   /// Whether a ray of the view passed this position.
-  [[nodiscard]] bool sees_through(const RangeImageView& view,
-                                  const Eigen::Vector3f& position_map) const;
+  [[nodiscard]] bool sees_through(const RangeImageView& view, const Eigen::Vector3f& position_map,
+                                  bool is_thin) const;
   /// How many of the views that are kept saw through this position.
-  [[nodiscard]] std::uint32_t times_free(const Eigen::Vector3f& position_map) const;
+  [[nodiscard]] std::uint32_t times_free(const Eigen::Vector3f& position_map, bool is_thin) const;
   /// Keeps the view of a scan that cleared.
   void keep(RangeImageView view, std::uint32_t scan);
   void forget_views();
@@ -140,19 +140,24 @@ struct StaticMap::State {
   std::vector<TileId> in_checkpoint;
 };
 
-bool StaticMap::State::sees_through(const RangeImageView& view,
-                                    const Eigen::Vector3f& position_map) const {
+bool StaticMap::State::sees_through(const RangeImageView& view, const Eigen::Vector3f& position_map,
+                                    bool is_thin) const {
   const double range_m = (position_map - view.origin_map()).norm();
   if (range_m > config.clearing_range_m) return false;
   const auto observation = view.observe(position_map);
   const double margin_m = std::max(config.clearing_margin_m, config.voxel_size_m);
   const double beyond_m = range_m + margin_m + config.clearing_margin_share * range_m;
-  return observation && view.sees_past(*observation, static_cast<float>(beyond_m));
+  if (!observation || !view.sees_past(*observation, static_cast<float>(beyond_m))) return false;
+  // A rail lies between two beams most of the time, and fills less than half of its voxel.
+  return !is_thin ||
+         view.has_beam_near(*observation, static_cast<float>(0.25 * config.voxel_size_m));
 }
 
-std::uint32_t StaticMap::State::times_free(const Eigen::Vector3f& position_map) const {
+std::uint32_t StaticMap::State::times_free(const Eigen::Vector3f& position_map,
+                                           bool is_thin) const {
   return static_cast<std::uint32_t>(std::ranges::count_if(
-      past_views, [&](const RangeImageView& view) { return sees_through(view, position_map); }));
+      past_views,
+      [&](const RangeImageView& view) { return sees_through(view, position_map, is_thin); }));
 }
 
 void StaticMap::State::enter_session(std::span<LiveTile* const> changing) {
@@ -224,8 +229,10 @@ void StaticMap::clear_seen_through(RangeImageView view, std::int64_t stamp_ns) {
   const std::vector<LiveTile*> near = tiles.near(view.origin_map(), config.clearing_range_m);
   const std::uint32_t scan = tiles.stamps().add(stamp_ns);
   const VisibilityTest test{
-      .is_free = [&](const Eigen::Vector3f& p_map) { return state_->sees_through(view, p_map); },
-      .times_free_before = [&](const Eigen::Vector3f& p_map) { return state_->times_free(p_map); },
+      .is_free = [&](const Eigen::Vector3f& p_map,
+                     bool is_thin) { return state_->sees_through(view, p_map, is_thin); },
+      .times_free_before = [&](const Eigen::Vector3f& p_map,
+                               bool is_thin) { return state_->times_free(p_map, is_thin); },
       .last_scan_cleared = state_->last_scan_cleared,
       .stamps = &tiles.stamps()};
   std::vector<std::uint8_t> hides(near.size());

@@ -48,6 +48,11 @@ void LiveTile::forget_beyond(LiveVoxel& voxel, std::uint32_t max_scans,
     voxel.misses = (voxel.misses - 1U) & 0x3FFFU;
 }
 
+bool LiveTile::is_surely_thin(const LiveVoxel& voxel) {
+  const ClassEvidence& evidence = voxel.packed.evidence;
+  return is_thin(evidence.winner()) && evidence.is_sure(voxel.packed.point_count);
+}
+
 std::uint32_t LiveTile::misses_to_clear(const LiveVoxel& voxel, const VisibilityRule& rule) {
   const bool is_sure = voxel.packed.evidence.is_sure(voxel.packed.point_count);
   return (is_sure ? rule.label_trust : 1) * rule.misses_to_clear;

@@ -33,10 +33,8 @@ class RestOfMovers : public testing::Test {
     const std::uint32_t number = stamps_.add(clock_offset_ns_ + movers_period_ns * ++scans_);
     tile_->insert(points, number);
     const VisibilityTest test{
-        .is_free =
-            [&](const Eigen::Vector3f& p_map) {
-              return free_columns.contains(static_cast<int>(p_map.x() / 0.2F));
-            },
+        .is_free = [&](const Eigen::Vector3f& p_map,
+                       bool) { return free_columns.contains(static_cast<int>(p_map.x() / 0.2F)); },
         .times_free_before = {},
         .last_scan_cleared = number,
         .stamps = &stamps_};

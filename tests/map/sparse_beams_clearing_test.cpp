@@ -25,7 +25,17 @@ struct SparseWorld {
   std::optional<double> vehicle_at_m = {};
   /// Bars of a fence every three degrees, 10 m about the lidar, turned by this [degrees].
   std::optional<double> fence_turned_by = {};
+  /// A rail of 8 cm across the way, 1 m above the ground, that labels are sure of.
+  std::optional<double> rail_at_m = {};
 
+  [[nodiscard]] std::optional<double> rail_range_m(const Vector3d& origin,
+                                                   const Vector3d& direction) const {
+    if (!rail_at_m || direction.x() <= 0.0) return std::nullopt;
+    const double range_m = (*rail_at_m - origin.x()) / direction.x();
+    const Vector3d hit = origin + range_m * direction;
+    const bool is_hit = std::abs(hit.z() + lidar_height_m - 1.0) < 0.04 && std::abs(hit.y()) < 3.0;
+    return is_hit ? std::optional(range_m) : std::nullopt;
+  }
   [[nodiscard]] double range_m(const Vector3d& origin, const Vector3d& direction,
                                double azimuth_degrees) const {
     double range_m = direction.z() < 0.0 ? -lidar_height_m / direction.z()
@@ -63,10 +73,15 @@ class SparseBeamsClearing : public testing::Test {
                                    std::sin(elevation));
           const double range_m = world.range_m(T_map_lidar.translation(), direction, azimuth);
           if (range_m > 120.0) continue;
+          if (const auto rail_m = world.rail_range_m(T_map_lidar.translation(), direction)) {
+            add_point(scan, (*rail_m * direction).cast<float>(), SemanticClass::fence);
+            continue;
+          }
           add_point(scan, (range_m * direction).cast<float>(), SemanticClass::unlabeled);
         }
       }
       map_.insert(scan, T_map_lidar);
+      if (++inserted_ % clearing_interval_ != 0) continue;
       map_.clear_seen_through(RangeImageView(scan.scan, {}, vlp_16(), T_map_lidar), stamp_ns_);
     }
   }
@@ -82,8 +97,18 @@ class SparseBeamsClearing : public testing::Test {
     return count;
   }
 
+  [[nodiscard]] int shown(SemanticClass label) {
+    int count = 0;
+    for (const auto& tile : map_.view()->tiles)
+      count += static_cast<int>(std::ranges::count_if(
+          tile->voxels, [label](const Voxel& voxel) { return voxel.evidence.winner() == label; }));
+    return count;
+  }
+
   StaticMap map_{StaticMapConfig{}};
   std::int64_t stamp_ns_ = 0;
+  int inserted_ = 0;
+  int clearing_interval_ = 1;
 };
 
 TEST_F(SparseBeamsClearing, GroundBelowTheLowestBeamStays) {
@@ -104,6 +129,19 @@ TEST_F(SparseBeamsClearing, BarsBesideThoseThatAreHitNowStay) {
   see({.fence_turned_by = 0.0}, 0.0, 2);
   see({.fence_turned_by = 0.8}, 0.0, 4);
   EXPECT_TRUE(removed().empty());
+}
+
+TEST_F(SparseBeamsClearing, ARailBetweenBeamsMostOfTheTimeStays) {
+  clearing_interval_ = 3;
+  for (int step = 0; step < 90; ++step) see({.rail_at_m = 12.0}, 0.1 * step);
+  int removed_of_it = 0;
+  for (const RemovedVoxel& voxel : removed())
+    removed_of_it += voxel.label == SemanticClass::fence ? 1 : 0;
+  EXPECT_GT(shown(SemanticClass::fence), 50);
+  EXPECT_LT(removed_of_it, 10);
+  // Once it is gone, rays go through its place, too.
+  for (int step = 0; step < 120; ++step) see({}, 0.1 * (step % 90));
+  EXPECT_LT(shown(SemanticClass::fence), 5);
 }
 
 }  // namespace
