@@ -17,6 +17,10 @@ constexpr const char* what_to_do_with_part =
     " is a part of a map that a killed server was writing, and may be all that is left of it: keep "
     "it for a repair (sqlite3's .recover), or remove its folder";
 
+constexpr const char* what_to_do_with_unreadable =
+    " is what a killed server was writing, and could not be read or given its name (the log says "
+    "more); it may be a whole map: see to the disk and the rights, and start the server again";
+
 /// The name that a whole map has from now on.
 fs::path keep(const LeftFreshFile& left, const MapFolder& folder) {
   fs::path name = left.name;
@@ -50,13 +54,16 @@ LeftMaps::LeftMaps(const fs::path& file, const MapFolder& folder) {
           if (const fs::path name = keep(left, folder); name != file) kept_beside_.push_back(name);
           return;
         case LeftContent::unfinished:
+          spdlog::warn("{}{}", left.path.string(), what_to_do_with_part);
+          return unfinished_.push_back(left.path);
+        case LeftContent::unreadable:
+          spdlog::error("{} cannot be read", left.path.string());
           break;
       }
     } catch (const std::exception& error) {
       spdlog::error("{} cannot be given a name ({})", left.path.string(), error.what());
     }
-    spdlog::warn("{}{}", left.path.string(), what_to_do_with_part);
-    unfinished_.push_back(left.path);
+    unreadable_.push_back(left.path);
   };
   for (const LeftFreshFile& left : left_fresh_files(file)) look_after(left);
   for (const LeftFreshFile& left : left_fresh_files_beside(file)) {
@@ -70,17 +77,21 @@ LeftMaps::LeftMaps(const fs::path& file, const MapFolder& folder) {
   }
 }
 
+void LeftMaps::forget(const fs::path& file) { std::erase(kept_beside_, file); }
+
 std::string LeftMaps::in_words() {
-  forget_removed(kept_beside_);
-  forget_removed(unfinished_);
+  for (std::vector<fs::path>* files : {&kept_beside_, &unfinished_, &unreadable_})
+    forget_removed(*files);
   std::string words;
   if (!kept_beside_.empty()) {
     words = "a server that was killed was saving its map as " + listed(kept_beside_) +
             ", which is whole: 'stillmap load' goes on in it";
   }
-  if (!unfinished_.empty()) {
-    words += (words.empty() ? "" : "; ") + listed(unfinished_) + what_to_do_with_part;
-  }
+  const auto add = [&](const std::vector<fs::path>& files, const char* what_to_do) {
+    if (!files.empty()) words += (words.empty() ? "" : "; ") + listed(files) + what_to_do;
+  };
+  add(unfinished_, what_to_do_with_part);
+  add(unreadable_, what_to_do_with_unreadable);
   return words;
 }
 

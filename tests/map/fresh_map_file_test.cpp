@@ -111,6 +111,52 @@ TEST_F(FreshMapFileTest, PartsThatAKilledProcessLeftGoWhereAFileHasTheName) {
   EXPECT_EQ(content_of(folder_ / "city.stillmap.new-backup/a.txt"), "mine");
 }
 
+TEST_F(FreshMapFileTest, WhatSomebodyPutIntoTheFolderIsNotRemoved) {
+  die_while_writing();
+  ASSERT_EQ(left_fresh_files(file_).size(), 1U);
+  const fs::path repaired =
+      left_fresh_files(file_).front().path.string() + std::string(".recovered");
+  open_map_file(repaired)->save(test::saved_map(1));
+  static_cast<void>(open_map_file(file_));
+  EXPECT_TRUE(left_fresh_files(file_).empty());
+  remove_useless_fresh_files(file_);
+  test::expect_equal(open_map_file(repaired)->load(), test::saved_map(1));
+}
+
+TEST_F(FreshMapFileTest, WhatCannotBeReadNowStays) {
+  static_cast<void>(open_map_file(file_));
+  const fs::path fresh = folder_ / "city.stillmap.new-1aB2cD/unfinished.stillmap";
+  fs::create_directory(fresh.parent_path());
+  fs::create_symlink(fresh, fresh);
+  ASSERT_EQ(left_fresh_files(file_).size(), 1U);
+  EXPECT_EQ(left_content(left_fresh_files(file_).front()), LeftContent::unreadable);
+  remove_useless_fresh_files(file_);
+  EXPECT_TRUE(fs::is_symlink(fresh));
+  fs::remove(fresh);
+  EXPECT_EQ(left_content(left_fresh_files(file_).front()), LeftContent::none);
+}
+
+TEST_F(FreshMapFileTest, WhatAnotherProgramHasLockedStays) {
+  const FreshMapFile fresh(file_);
+  open_map_file(fresh.path())->save(test::saved_map(1));
+  SQLite::Database other(fresh.path().string(), SQLite::OPEN_READWRITE);
+  other.exec("PRAGMA locking_mode = EXCLUSIVE; BEGIN EXCLUSIVE; DELETE FROM metadata");
+  static_cast<void>(open_map_file(file_));
+  // Waits as long as SQLite waits for a lock.
+  remove_useless_fresh_files(file_);
+  EXPECT_TRUE(fs::exists(fresh.path()));
+}
+
+/// `merge`: between its steps it is the map that another one is to be put into.
+TEST_F(FreshMapFileTest, AMapThatWasToBeChangedFurtherIsNotTakenForWhole) {
+  const FreshMapFile fresh(file_, FreshMapFile::Writing::in_steps);
+  open_map_file(fresh.path())->save(test::saved_map(1));
+  ASSERT_EQ(left_fresh_files(file_).size(), 1U);
+  EXPECT_EQ(left_content(left_fresh_files(file_).front()), LeftContent::none);
+  remove_useless_fresh_files(file_);
+  EXPECT_TRUE(names().empty());
+}
+
 TEST_F(FreshMapFileTest, WhatHoldsNoMapGoes) {
   const FreshMapFile fresh(file_);
   static_cast<void>(open_map_file(fresh.path()));
@@ -177,6 +223,11 @@ TEST_F(FreshMapFileTest, ALockThatIsLockedAndSaysItsOwnIsHeld) {
 TEST_F(FreshMapFileTest, WhatWasToLieBesideTheFileIsNamedAndStays) {
   const FreshMapFile own(file_), of_town(folder_ / "town.2026-05-31_142500.stillmap");
   const FreshMapFile dated(folder_ / "city.2026-05-31_142500.stillmap");
+  // Names of other maps.
+  const FreshMapFile of_north(folder_ / "city.north.stillmap");
+  const FreshMapFile of_north_dated(folder_ / "city.north.2026-05-31_142500.stillmap");
+  const FreshMapFile of_day(folder_ / "city.2026-05-31.stillmap");
+  const FreshMapFile of_noon(folder_ / "city.2026-05-31_142500.noon.stillmap");
   for (const FreshMapFile* fresh : {&own, &of_town, &dated})
     open_map_file(fresh->path())->save(test::saved_map(1));
   static_cast<void>(folder_.file("city.1.stillmap.new-letter", "mine"));
@@ -188,6 +239,8 @@ TEST_F(FreshMapFileTest, WhatWasToLieBesideTheFileIsNamedAndStays) {
   const std::vector<LeftFreshFile> beside = left_fresh_files_beside(file_);
   ASSERT_EQ(beside.size(), 1U);
   EXPECT_EQ(beside.front().path, dated.path());
+  const FreshMapFile second(folder_ / "city.2026-05-31_142500.2.stillmap");
+  EXPECT_EQ(left_fresh_files_beside(file_).size(), 2U);
   remove_useless_fresh_files(file_);
   EXPECT_EQ(left_content(left.front()), LeftContent::whole);
   ASSERT_TRUE(keep_fresh_file(left.front(), file_));

@@ -121,7 +121,8 @@ std::string source_of(const EarlierMap& map) {
 void save_merged(const MergeArguments& arguments, const EarlierMap& map, const EarlierMap& other,
                  const SavedMap& merged, std::int64_t clock_offset_ns, std::size_t closures) {
   try {
-    const FreshMapFile fresh(arguments.out);
+    // Between the two it is a whole map, but of the first one alone.
+    const FreshMapFile fresh(arguments.out, FreshMapFile::Writing::in_steps);
     map.copy_to(fresh.path());
     add_map_session(
         fresh.path(), merged,

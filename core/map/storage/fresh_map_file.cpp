@@ -1,11 +1,16 @@
 #include "core/map/storage/fresh_map_file.hpp"
 
 #include <SQLiteCpp/Database.h>
+#include <sqlite3.h>
 
 #include <algorithm>
+#include <array>
+#include <exception>
+#include <fstream>
 #include <functional>
-#include <stdexcept>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -22,10 +27,14 @@ constexpr const char* folder_suffix = ".new-";
 /// With the six letters after it.
 constexpr std::size_t ending_of_folder = 11;
 constexpr const char* name_in_folder = "unfinished.stillmap";
+/// Of one that is changed after it was written whole.
+constexpr const char* name_in_steps = "in_steps.stillmap";
+/// As the time in the name of a map that is kept beside another one.
+constexpr std::string_view form_of_time = "dddd-dd-dd_dddddd";
 
-std::vector<fs::path> entries_of(const fs::path& folder) {
+/// `error`: what kept it from being read to its end.
+std::vector<fs::path> entries_of(const fs::path& folder, std::error_code& error) {
   std::vector<fs::path> entries;
-  std::error_code error;
   for (fs::directory_iterator entry(folder, error); !error && entry != fs::directory_iterator();
        entry.increment(error)) {
     entries.push_back(entry->path());
@@ -33,29 +42,88 @@ std::vector<fs::path> entries_of(const fs::path& folder) {
   return entries;
 }
 
-/// Whether it has no more in it than a fresh map file and what SQLite puts beside that.
-bool is_of_fresh_file(const fs::path& folder) {
-  std::error_code error;
-  if (fs::symlink_status(folder, error).type() != fs::file_type::directory) return false;
-  for (const fs::path& entry : entries_of(folder)) {
-    if (!entry.filename().string().starts_with(name_in_folder)) return false;
+/// Whether this is the name of the database or of what SQLite puts beside it.
+bool is_of_database(const fs::path& entry, const char* database) {
+  for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
+    if (entry.filename() == std::string(database) + suffix) return true;
   }
-  return true;
+  return false;
+}
+
+/// The fresh map file of this folder, which may not be there yet; nothing where the folder has
+/// anything else in it, such as what somebody repaired: that is no process's to remove.
+std::optional<fs::path> fresh_file_of(const fs::path& folder) {
+  std::error_code error;
+  if (fs::symlink_status(folder, error).type() != fs::file_type::directory) return std::nullopt;
+  const std::vector<fs::path> entries = entries_of(folder, error);
+  for (const char* name : {name_in_folder, name_in_steps}) {
+    if (std::ranges::all_of(entries, [&](const auto& each) { return is_of_database(each, name); }))
+      return folder / name;
+  }
+  return std::nullopt;
+}
+
+/// A time, or a time and ".2", ".3", ...
+bool is_time(std::string_view text) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  if (text.size() < form_of_time.size()) return false;
+  const std::string_view number = text.substr(form_of_time.size());
+  const bool is_alike =
+      std::ranges::equal(text.substr(0, form_of_time.size()), form_of_time,
+                         [&](char c, char form) { return form == 'd' ? is_digit(c) : c == form; });
+  return is_alike && (number.empty() || (number.size() > 1 && number.front() == '.' &&
+                                         std::ranges::all_of(number.substr(1), is_digit)));
+}
+
+/// Whether the fault lies in the file, and not in the disk, the memory or the rights: those may be
+/// better tomorrow.
+bool is_of_content(const SQLite::Exception& fault) {
+  constexpr std::array faults{SQLITE_CORRUPT, SQLITE_NOTADB, SQLITE_ERROR, SQLITE_FORMAT};
+  return std::ranges::find(faults, fault.getErrorCode()) != faults.end();
+}
+
+/// The same of the first fault that a check of all pages tells.
+bool is_of_content(const std::string& told) {
+  constexpr std::string_view page_not_read = "error code=";
+  const std::size_t begin = told.find(page_not_read);
+  return begin == std::string::npos ||
+         told.substr(begin + page_not_read.size()).starts_with(std::to_string(SQLITE_CORRUPT));
+}
+
+/// Whether nothing has this name; false where that cannot be found out.
+bool is_absent(const std::error_code& error) {
+  return error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory;
+}
+
+/// Throws MapFileError, SQLite::Exception.
+LeftContent content_of_map(const fs::path& file) {
+  std::error_code unknown;
+  // What is in a log was finished.
+  if (fs::exists(beside(file, "-wal"), unknown)) static_cast<void>(open_map_database(file));
+  SQLite::Database alone(uri_without_log(file), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+  const std::string told = alone.execAndGet("PRAGMA integrity_check(1)").getString();
+  if (told != "ok") return is_of_content(told) ? LeftContent::unfinished : LeftContent::unreadable;
+  const bool holds_map = alone
+                             .execAndGet(
+                                 "SELECT EXISTS (SELECT 1 FROM tiles) OR "
+                                 "EXISTS (SELECT 1 FROM trajectory)")
+                             .getInt() != 0;
+  return holds_map ? LeftContent::whole : LeftContent::none;
 }
 
 /// In this folder, of files whose name is one of those; the newest first.
 std::vector<LeftFreshFile> left_fresh_files_where(
     const fs::path& folder, const std::function<bool(const std::string& name)>& is_wanted) {
   std::vector<std::pair<fs::file_time_type, LeftFreshFile>> found;
-  for (const fs::path& entry : entries_of(folder)) {
+  std::error_code unknown;
+  for (const fs::path& entry : entries_of(folder, unknown)) {
     std::string name = entry.filename().string();
     const std::size_t end = name.rfind(folder_suffix);
     if (end == std::string::npos || name.size() - end != ending_of_folder) continue;
     name.resize(end);
-    if (!is_wanted(name) || !is_of_fresh_file(entry)) continue;
-    std::error_code unknown;
-    const fs::path fresh = entry / name_in_folder;
-    found.push_back({fs::last_write_time(fresh, unknown), {fresh, folder / name}});
+    if (!is_wanted(name)) continue;
+    const std::optional<fs::path> fresh = fresh_file_of(entry);
+    if (fresh) found.push_back({fs::last_write_time(*fresh, unknown), {*fresh, folder / name}});
   }
   std::ranges::stable_sort(found, std::ranges::greater(),
                            [](const auto& each) { return each.first; });
@@ -66,8 +134,9 @@ std::vector<LeftFreshFile> left_fresh_files_where(
 
 }  // namespace
 
-FreshMapFile::FreshMapFile(const fs::path& file)
-    : folder_(beside(real_file(file), folder_suffix)), path_(folder_.path() / name_in_folder) {}
+FreshMapFile::FreshMapFile(const fs::path& file, Writing writing)
+    : folder_(beside(real_file(file), folder_suffix)),
+      path_(folder_.path() / (writing == Writing::in_steps ? name_in_steps : name_in_folder)) {}
 
 std::vector<LeftFreshFile> left_fresh_files(const fs::path& file) {
   const fs::path real = real_file(file);
@@ -81,31 +150,32 @@ std::vector<LeftFreshFile> left_fresh_files_beside(const fs::path& file) {
   const std::string begin = real.stem().string() + ".";
   const std::string end = real.extension().string();
   return left_fresh_files_where(real.parent_path(), [&](const std::string& name) {
-    return name.size() >= begin.size() + end.size() && name.starts_with(begin) &&
-           name.ends_with(end);
+    if (name.size() < begin.size() + end.size()) return false;
+    // "city.north.stillmap" beside "city.stillmap" is another map's name.
+    return name.starts_with(begin) && name.ends_with(end) &&
+           is_time(std::string_view(name).substr(begin.size(),
+                                                 name.size() - begin.size() - end.size()));
   });
 }
 
 LeftContent left_content(const LeftFreshFile& left) {
-  std::error_code not_there;
-  const std::uintmax_t bytes = fs::file_size(left.path, not_there);
-  if (not_there || bytes == 0) return LeftContent::none;
+  std::error_code fault;
+  static_cast<void>(entries_of(left.path.parent_path(), fault));
+  if (fault) return LeftContent::unreadable;
+  if (left.path.filename() == name_in_steps) return LeftContent::none;
+  const std::uintmax_t bytes = fs::file_size(left.path, fault);
+  if (fault) return is_absent(fault) ? LeftContent::none : LeftContent::unreadable;
+  if (bytes == 0) return LeftContent::none;
+  if (!std::ifstream(left.path)) return LeftContent::unreadable;
   if (!is_map_file(left.path)) return LeftContent::unfinished;
   try {
-    // What is in a log was finished.
-    if (fs::exists(beside(left.path, "-wal"), not_there))
-      static_cast<void>(open_map_database(left.path));
-    SQLite::Database alone(uri_without_log(left.path), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
-    if (alone.execAndGet("PRAGMA integrity_check(1)").getString() != "ok")
-      return LeftContent::unfinished;
-    const bool holds_map = alone
-                               .execAndGet(
-                                   "SELECT EXISTS (SELECT 1 FROM tiles) OR "
-                                   "EXISTS (SELECT 1 FROM trajectory)")
-                               .getInt() != 0;
-    return holds_map ? LeftContent::whole : LeftContent::none;
-  } catch (const std::runtime_error&) {
+    return content_of_map(left.path);
+  } catch (const UnusableMapFileError&) {
     return LeftContent::unfinished;
+  } catch (const SQLite::Exception& error) {
+    return is_of_content(error) ? LeftContent::unfinished : LeftContent::unreadable;
+  } catch (const std::exception&) {
+    return LeftContent::unreadable;
   }
 }
 

@@ -14,8 +14,15 @@ namespace stillmap {
 /// a file of somebody else. Where it did not take the place, it goes with the object.
 class FreshMapFile {
  public:
+  enum class Writing : std::uint8_t {
+    /// What is there, once it is a whole map, is the map that was to be written.
+    at_once,
+    /// It is changed after it was written whole, and made of maps that stay: what a killed process
+    /// leaves of it is of no use.
+    in_steps
+  };
   /// Throws std::filesystem::filesystem_error.
-  explicit FreshMapFile(const std::filesystem::path& file);
+  explicit FreshMapFile(const std::filesystem::path& file, Writing writing = Writing::at_once);
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
@@ -34,15 +41,19 @@ struct LeftFreshFile {
 /// Those of this file, the newest first. For who holds its lock (MapLock) and has made none yet.
 [[nodiscard]] std::vector<LeftFreshFile> left_fresh_files(const std::filesystem::path& file);
 
-/// Those of files beside `file` under a longer name, as of "city.2026-05-31_142500.stillmap" beside
+/// Those of files beside `file` that have its name with a time, and it may be a number, in it:
+/// "city.2026-05-31_142500.stillmap" and "city.2026-05-31_142500.2.stillmap" beside
 /// "city.stillmap". Another process may be making one now: then it holds the lock of its name.
 [[nodiscard]] std::vector<LeftFreshFile> left_fresh_files_beside(const std::filesystem::path& file);
 
 /// How much of a map is in what was left.
 enum class LeftContent : std::uint8_t {
+  /// Nothing, or no more than what it was made of has.
   none,
-  /// A part, or something that cannot be read.
+  /// A part, or something that is no map.
   unfinished,
+  /// What is in it could not be found out: rights, the disk, another process. It may be whole.
+  unreadable,
   whole
 };
 /// Reads all of the file, and leaves a part as it is: SQLite, once it opens it, would take back
