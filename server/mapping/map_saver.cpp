@@ -344,6 +344,8 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
   }
   statistics_.map_saved(took.count());
   is_memory_alone_ = false;
+  left_maps_.forget(target);
+  statistics_.set_maps_left(left_maps_.in_words());
   remember_metadata(map);
   remember_as_saved(*latest_map_.view(), latest_map_.poses_added());
   is_partial_ = false;

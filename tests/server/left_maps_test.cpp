@@ -8,6 +8,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -92,6 +93,37 @@ TEST_F(LeftMapsTest, AWholeOneIsKeptBesideAFileThatHasTheName) {
   EXPECT_EQ(poses_in(kept), 1U);
   EXPECT_TRUE(left().empty());
   EXPECT_THAT(statistics_.maps_left(), HasSubstr(kept.string() + ", which is whole"));
+}
+
+TEST_F(LeftMapsTest, OneThatIsKeptBesideIsToldUntilItIsLoaded) {
+  const fs::path dated = folder_ / "city.2026-05-31_142500.stillmap";
+  die_while_writing(dated);
+  MapSaver saver(latest_map_, statistics_, file_, {});
+  static_cast<void>(saver.load());
+  latest_map_.begin(StaticMap(StaticMapConfig()).view(), {});
+  ASSERT_THAT(statistics_.maps_left(), HasSubstr(dated.string()));
+  static_cast<void>(saver.resume_from(
+      dated.filename(),
+      [](const SavedMap&, const auto&) -> std::function<void()> { return [] {}; }));
+  EXPECT_EQ(statistics_.maps_left(), "");
+}
+
+TEST_F(LeftMapsTest, OneThatCannotBeReadIsToldAndStays) {
+  const fs::path fresh = folder_ / "city.stillmap.new-1aB2cD/unfinished.stillmap";
+  fs::create_directory(fresh.parent_path());
+  fs::create_symlink(fresh, fresh);
+  static_cast<void>(tiles_at_start());
+  EXPECT_TRUE(fs::is_symlink(fresh));
+  EXPECT_THAT(statistics_.maps_left(), HasSubstr(fresh.string() + " is what a killed server"));
+}
+
+TEST_F(LeftMapsTest, AMapThatAnotherServerWasWritingBesideIsItsOwn) {
+  const fs::path of_another = folder_ / "city.north.stillmap";
+  die_while_writing(of_another);
+  static_cast<void>(tiles_at_start());
+  EXPECT_FALSE(fs::exists(of_another));
+  EXPECT_EQ(left().size(), 1U);
+  EXPECT_EQ(statistics_.maps_left(), "");
 }
 
 TEST_F(LeftMapsTest, OneThatWasToLieBesideTheNameIsGivenItsOwn) {
