@@ -1,5 +1,6 @@
 #include "server/traversability/traversability.hpp"
 
+#include <chrono>
 #include <utility>
 
 namespace stillmap::server {
@@ -7,7 +8,9 @@ namespace stillmap::server {
 Traversability::Traversability(const ServerConfig& config, dds::Participant& participant,
                                const dds::Topics& topics, const LatestMap& latest_map,
                                TileReader& tiles, Statistics& statistics, ThrottleCallback throttle)
-    : cache_(snapshot_, latest_map, tiles),
+    : cache_(snapshot_, latest_map, tiles,
+             TraversabilityCache::longest_lag(
+                 std::chrono::duration<double>(config.traversability.update_period_s))),
       grid_(config.traversability, config.frames.map, latest_map, snapshot_) {
   std::vector<RobotProfile> robots = load_robots(config.traversability);
   if (robots.empty()) return;

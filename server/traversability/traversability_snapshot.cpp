@@ -88,6 +88,20 @@ TraversabilityCache::TraversabilityCache(const TraversabilitySnapshot& snapshot,
                                          std::chrono::milliseconds longest_lag)
     : snapshot_(snapshot), latest_map_(latest_map), tiles_(tiles), longest_lag_(longest_lag) {}
 
+std::chrono::milliseconds TraversabilityCache::longest_lag(
+    std::chrono::duration<double> update_period) {
+  return std::chrono::seconds(2) +
+         std::chrono::duration_cast<std::chrono::milliseconds>(update_period);
+}
+
+bool TraversabilityCache::Computed::is_of(
+    const std::string& profile, std::uint64_t id,
+    std::span<const std::shared_ptr<const Tile>> others) const {
+  return view && view->profile.name == profile && map_id == id &&
+         std::ranges::equal(tiles, others,
+                            [](const auto& kept, const auto& tile) { return kept.lock() == tile; });
+}
+
 bool TraversabilityCache::is_behind(const TraversabilitySnapshot::Known& kept, MapTime map_time,
                                     std::span<const std::shared_ptr<const Tile>> tiles,
                                     std::span<const Eigen::AlignedBox2d> boxes_map) const {
@@ -117,12 +131,20 @@ std::shared_ptr<const TraversabilityView> TraversabilityCache::view(
                                 "just corrected; at most " +
                                 std::to_string(max_tiles) + " can be answered: ask for parts");
   }
+  {
+    const std::scoped_lock lock(mutex_);
+    if (computed_.is_of(profile, map->map_id, tiles)) return computed_.view;
+  }
+  const std::vector<std::weak_ptr<const Tile>> of_map(tiles.begin(), tiles.end());
   for (auto& tile : tiles) tile = tiles_.read(tile);
   MapSnapshot part = *map;
   part.tiles = TileTable(std::move(tiles));
   TraversabilityMap computed({kept.view->profile});
   static_cast<void>(computed.update(part));
-  return computed.view(profile);
+  auto view = computed.view(profile);
+  const std::scoped_lock lock(mutex_);
+  computed_ = {.map_id = map->map_id, .tiles = of_map, .view = view};
+  return view;
 }
 
 }  // namespace stillmap::server

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -73,6 +74,11 @@ class TraversabilityCache {
                       TileReader& tiles,
                       std::chrono::milliseconds longest_lag = std::chrono::seconds(2));
 
+  /// How old the view in the background may grow that is updated once in this period, and is no
+  /// sign of a busy machine.
+  [[nodiscard]] static std::chrono::milliseconds longest_lag(
+      std::chrono::duration<double> update_period);
+
   /// A view that is complete within the boxes (map frame [m]); of more tiles than are computed for
   /// one answer it may be older than `longest_lag`. Throws std::invalid_argument for an
   /// unknown robot, naming the known ones, and for boxes with more such tiles that the view in the
@@ -91,10 +97,24 @@ class TraversabilityCache {
                                std::span<const std::shared_ptr<const Tile>> tiles,
                                std::span<const Eigen::AlignedBox2d> boxes_map) const;
 
+  /// The last view that was computed for a query: clients ask for the same again and again.
+  struct Computed {
+    std::uint64_t map_id = 0;
+    /// That it is of, as the map has them. Those that the map drops meanwhile are not kept for it.
+    std::vector<std::weak_ptr<const Tile>> tiles;
+    std::shared_ptr<const TraversabilityView> view;
+
+    [[nodiscard]] bool is_of(const std::string& profile, std::uint64_t id,
+                             std::span<const std::shared_ptr<const Tile>> others) const;
+  };
+
   const TraversabilitySnapshot& snapshot_;
   const LatestMap& latest_map_;
   TileReader& tiles_;
   std::chrono::milliseconds longest_lag_;
+  mutable std::mutex mutex_;
+  /// Guarded by the mutex.
+  mutable Computed computed_;
 };
 
 }  // namespace stillmap::server

@@ -247,6 +247,31 @@ TEST_F(TraversabilityThreadTest, AnswersDoNotWaitForAViewThatIsFarBehind) {
   const auto now = impatient.view("small", box);
   EXPECT_EQ(now->version, latest_map_.view()->version);
   EXPECT_EQ(test::look(*now, 1.1, 1.1).cell.cost, 100);
+  EXPECT_EQ(impatient.view("small", box), now) << "as long as nothing changes";
+  world_.block(2, 1, 3, 2, 0.3, 2.0, building);
+  latest_map_.publish(shared(world_.view()));
+  EXPECT_EQ(test::look(*impatient.view("small", box), 2.1, 1.1).cell.cost, 100);
+}
+
+TEST_F(TraversabilityThreadTest, AViewThatIsUpdatedSeldomIsNotBehindBeforeItsPeriodIsOver) {
+  start(0s);
+  ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
+  thread_.reset();
+  TileReader tiles;
+  const TraversabilityCache cache(snapshot_, latest_map_, tiles,
+                                  TraversabilityCache::longest_lag(10s));
+  const auto known = snapshot_.known("small");
+  const auto publish_as_of = [&](std::chrono::seconds age) {
+    snapshot_.publish({known.view}, known.map, known.window, known.corrections, known.stamp_ns,
+                      std::chrono::steady_clock::now() - age);
+  };
+  world_.block(1, 1, 2, 2, 0.3, 2.0, building);
+  latest_map_.publish(shared(world_.view()));
+  const Eigen::AlignedBox2d box(Eigen::Vector2d(-1.0, -1.0), Eigen::Vector2d(3.0, 3.0));
+  publish_as_of(11s);
+  EXPECT_EQ(cache.view("small", box), known.view);
+  publish_as_of(13s);
+  EXPECT_EQ(test::look(*cache.view("small", box), 1.1, 1.1).cell.cost, 100);
 }
 
 TEST_F(TraversabilityThreadTest, APathIsAnsweredByTheTilesAlongIt) {
