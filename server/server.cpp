@@ -108,6 +108,8 @@ Server::~Server() = default;
 // for what they have in work. The topics are closed after that, by the destructors.
 void Server::stop() {
   parts_->throttle.release();
+  // Where every scan counts, the mapping thread may be waiting for the octree.
+  if (parts_->occupancy) parts_->occupancy->thread().release();
   parts_->metrics.reset();
   parts_->interface.stop();
   parts_->mapping.stop();

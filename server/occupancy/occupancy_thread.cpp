@@ -63,8 +63,9 @@ void OccupancyThread::begin(std::shared_ptr<const MapSnapshot> view) {
 
 void OccupancyThread::add(OccupancyScan scan) {
   if (every_scan_counts_) {
-    jobs_.wait_until([this](const Jobs& jobs) { return scans_in(jobs) < max_scans_; },
-                     longest_back_pressure);
+    jobs_.wait_until(
+        [this](const Jobs& jobs) { return is_released_ || scans_in(jobs) < max_scans_; },
+        longest_back_pressure);
   }
   jobs_.edit([&](Jobs& jobs) {
     if (const std::size_t scans = scans_in(jobs); scans >= max_scans_) {
@@ -73,6 +74,10 @@ void OccupancyThread::add(OccupancyScan scan) {
     }
     jobs.emplace_back(std::move(scan));
   });
+}
+
+void OccupancyThread::release() {
+  jobs_.edit([this](Jobs&) { is_released_ = true; });
 }
 
 void OccupancyThread::follow(std::shared_ptr<const MapSnapshot> view) {

@@ -64,6 +64,8 @@ class OccupancyThread {
   /// at once, as `add` does but with delivery `every`; one thread calls both.
   void begin(std::shared_ptr<const MapSnapshot> view);
   void add(OccupancyScan scan);
+  /// The server ends: from now on `add` does not wait for room.
+  void release();
   /// Drops and restores parts of the octree with the tiles that were evicted and reloaded.
   void follow(std::shared_ptr<const MapSnapshot> view);
 
@@ -115,6 +117,8 @@ class OccupancyThread {
   BoundedQueue<Job> jobs_;
   /// The last view that was given to `follow`. Guarded by the queue's lock.
   std::shared_ptr<const MapSnapshot> followed_;
+  /// Guarded by the queue's lock.
+  bool is_released_ = false;
   mutable std::mutex map_mutex_;
   OccupancyMap map_;
   /// What waits to replace it: a map without voxels needs no octree to answer from.

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <future>
 #include <mutex>
@@ -263,6 +265,26 @@ TEST_F(OccupancyThreadTest, TakesEveryScanWholeWhereEachCounts) {
   EXPECT_EQ(counted(statistics_, "occupancy_scans_dropped"), 0U);
   EXPECT_EQ(counted(statistics_, "occupancy_not_cleared"), 0U);
   EXPECT_EQ(thread.encode(false).data.bytes, map.encode(false).bytes);
+}
+
+TEST_F(OccupancyThreadTest, NobodyWaitsForRoomWhenTheServerEnds) {
+  OccupancyServiceConfig config;
+  config.queue_length = 1;
+  std::promise<void> opened;
+  const auto throttle = [gate = opened.get_future().share()] { gate.wait(); };
+  server::OccupancyThread thread(config, statistics_, throttle, scheduling, DeliveryMode::every);
+  std::atomic<bool> has_added = false;
+  const std::jthread mapper([&] {
+    for (int i = 0; i < 3; ++i) thread.add(room(i));
+    has_added = true;
+  });
+  EXPECT_FALSE(eventually([&] { return has_added.load(); }, 500ms));
+  const auto began = std::chrono::steady_clock::now();
+  thread.release();
+  EXPECT_TRUE(eventually([&] { return has_added.load(); }));
+  EXPECT_LT(std::chrono::steady_clock::now() - began,
+            server::OccupancyThread::longest_back_pressure / 2);
+  opened.set_value();
 }
 
 TEST_F(OccupancyThreadTest, StopsClearingAndThenDropsScansWhenItCannotKeepUp) {
