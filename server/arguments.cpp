@@ -81,15 +81,20 @@ void add_operation_options(CLI::App& program, OperationArguments& operation) {
       ->check(listening_address_fault);
 }
 
-/// What would keep the server from its map file on this machine; the file may be meant for another.
+/// What would keep the server from its map file on this machine; the file may be meant for another,
+/// and where the server runs as a service, that may make the folder.
 void warn_of_map_folder(const ServerConfig& config) {
   if (config.map.file.empty()) return;
   const std::filesystem::path folder = std::filesystem::absolute(config.map.file).parent_path();
   std::error_code unknown;
-  if (std::filesystem::is_directory(folder, unknown)) return;
-  std::cerr << "map.file: the folder " << folder.string()
-            << " is not there on this machine, where the server would not start: make it, or is a "
-               "disk not mounted?\n";
+  const std::filesystem::file_type type = std::filesystem::status(folder, unknown).type();
+  if (type == std::filesystem::file_type::not_found) {
+    std::cerr << "map.file: the folder " << folder.string()
+              << " is not there yet: the server needs it when it starts (the installed service "
+                 "makes its own); is a disk not mounted?\n";
+  } else if (!unknown && type != std::filesystem::file_type::directory) {
+    std::cerr << "map.file: " << folder.string() << " is no folder\n";
+  }
 }
 
 /// Throws ConfigError with every fault, ModelError or SecurityError.
