@@ -250,15 +250,18 @@ class OccupancySource {
   [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query) {
     return map_ ? map_->answer(query) : client_->query_occupancy(query);
   }
-  /// What of the scans that a server has mapped is not in its octree; empty where all is.
+  /// What of the scans that a server has mapped may not be in its octree; empty where all is.
   [[nodiscard]] std::string missing() {
     if (map_) return {};
     const dds::ServerStatus status = client_->status();
     const std::uint64_t dropped = status.counter("occupancy_scans_dropped");
     if (dropped == 0) return {};
-    return std::to_string(dropped) + " of the " + std::to_string(status.counter("scans_mapped")) +
-           " scans that the server has mapped since it started are not in its octree, which could "
-           "not keep up; an octree of the whole static map: 'stillmap octomap --map MAPFILE'";
+    // Counted over all maps: a reset, a load and a correction of the path make the octree anew.
+    return "the octree of the server could not keep up: since it started, " +
+           std::to_string(dropped) + " of the " + std::to_string(status.counter("scans_mapped")) +
+           " scans that were mapped did not come into it (it is made anew by a reset, a load and "
+           "a closed loop: what was left out before that is nothing it lacks); an octree of the "
+           "whole static map: 'stillmap octomap --map MAPFILE'";
   }
 
  private:
