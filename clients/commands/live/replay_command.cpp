@@ -175,10 +175,24 @@ ServerCounts counts_since(const dds::ServerStatus& before, const dds::ServerStat
           .is_restarted = is_restarted};
 }
 
+/// How long nothing may change before a server is waited for no longer.
+struct Patience {
+  /// Until the first scan was mapped or dropped: a server may be slow to begin.
+  std::chrono::milliseconds first;
+  std::chrono::milliseconds next;
+};
+
+/// Of a lossy topic, which loses scans that are not counted, the last ones are not waited for long.
+Patience patience_of(const ReplayOptions& options, bool is_lossless, bool server_takes_topic) {
+  constexpr std::chrono::seconds lossy{2};
+  return {.first = is_lossless || server_takes_topic ? options.idle_timeout : lossy,
+          .next = is_lossless ? options.idle_timeout : lossy};
+}
+
 /// Polls the status until the server has mapped or dropped `scans` of them since `before`, or
-/// nothing has changed for `idle_timeout`. Returns the last status.
+/// patience is over. Returns the last status.
 dds::ServerStatus wait_until_mapped(Client& client, const dds::ServerStatus& before,
-                                    std::uint64_t scans, std::chrono::milliseconds idle_timeout,
+                                    std::uint64_t scans, const Patience& patience,
                                     StopSignal& stop) {
   dds::ServerStatus status = client.status();
   auto changed = Clock::now();
@@ -187,6 +201,7 @@ dds::ServerStatus wait_until_mapped(Client& client, const dds::ServerStatus& bef
     const ServerCounts counts = counts_since(before, status);
     const std::uint64_t done = counts.mapped + counts.dropped;
     if (done != std::exchange(done_before, done)) changed = Clock::now();
+    const auto idle_timeout = done == 0 ? patience.first : patience.next;
     if (done >= scans || Clock::now() - changed > idle_timeout) return status;
     if (stop.wait_for(status_period)) return status;
     status = client.status();
@@ -315,13 +330,12 @@ ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
   outcome.poses = poses.poses_of(stamps_ns);
   outcome.frame = poses.frame();
   if (stop.requested()) return outcome;
-  // A lossy topic loses scans that are not counted, so the wait for them is short.
-  const auto idle_timeout =
-      arguments.lossless ? replay_options(arguments).idle_timeout : std::chrono::seconds(2);
-  const dds::ServerStatus after =
-      wait_until_mapped(client, before, stamps_ns.size(), idle_timeout, stop);
-  outcome.server = counts_since(before, after);
   outcome.server_takes_topic = before.points_topic == arguments.topic;
+  const Patience patience =
+      patience_of(replay_options(arguments), arguments.lossless, outcome.server_takes_topic);
+  const dds::ServerStatus after =
+      wait_until_mapped(client, before, stamps_ns.size(), patience, stop);
+  outcome.server = counts_since(before, after);
   if (outcome.server->is_restarted)
     std::cerr << "stillmap: the server was restarted during the replay: what it counted before is "
                  "lost\n";
