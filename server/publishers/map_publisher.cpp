@@ -46,7 +46,9 @@ bool MapPublisher::has_changed(PathState& published, bool with_view) const {
                       .poses = latest_map_.poses_added(),
                       .corrections = latest_map_.corrections(),
                       .version = with_view ? view->version : 0};
-  if (now == published || (now.poses == 0 && view->tiles.empty())) return false;
+  const bool is_none = now.poses == 0 && view->tiles.empty();
+  const bool was_none = published == PathState();
+  if (now == published || (is_none && was_none)) return false;
   published = now;
   return true;
 }

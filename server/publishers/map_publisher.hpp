@@ -33,7 +33,8 @@ class MapPublisher {
     std::uint64_t version = 0;
     friend bool operator==(const PathState&, const PathState&) = default;
   };
-  /// Whether there is a path, and another one than `published`, which then becomes it.
+  /// Whether there is another path than `published`, which then becomes it; none is another one
+  /// where there was one: who comes late would be shown the path of the map before.
   /// `with_view`: or another view along it.
   [[nodiscard]] bool has_changed(PathState& published, bool with_view) const;
 

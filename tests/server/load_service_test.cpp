@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include <atomic>
+#include <cstdint>
 #include <fstream>
 
 #include "core/map/static_map.hpp"
@@ -106,6 +107,25 @@ TEST_F(LoadService, AMapThatAResetKeptCanBeLoadedAgain) {
   EXPECT_EQ(open_map_file(setup_.map_file())->load().trajectory.size(), 4U);
   EXPECT_TRUE(client_.reset(true).kept_file.empty());
   EXPECT_TRUE(open_map_file(begun.kept_file)->load().view.tiles.empty()) << "it was running";
+}
+
+TEST_F(LoadService, WhoComesAfterAResetIsShownNoPathOfTheMapBefore) {
+  map_scans(0, 8);
+  server_.send(SIGTERM);
+  ASSERT_EQ(server_.wait_for_exit(patience), 0);
+  // It has added no pose to the path that it shows.
+  const ServerProcess resumed(setup_.server_arguments());
+  Client client(setup_.client());
+  client.wait_for_server(patience);
+  const auto shows_path_of = [&](std::size_t poses) {
+    std::atomic<std::size_t> shown = SIZE_MAX;
+    const Subscription path =
+        client.subscribe_path([&](const Trajectory& now) { shown = now.size(); });
+    return eventually([&] { return shown == poses; });
+  };
+  ASSERT_TRUE(shows_path_of(8));
+  static_cast<void>(client.reset());
+  EXPECT_TRUE(shows_path_of(0));
 }
 
 TEST_F(LoadService, ASecondServerOfTheFileEndsAndNamesTheFirst) {
