@@ -49,7 +49,9 @@ TEST(Namesake, IsNoServerOfAnotherName) {
   EXPECT_FALSE(eventually([&] { return names_another(client.status()); }, std::chrono::seconds(3)));
 }
 
-TEST(Namesake, IsNotThePredecessorThatWasKilled) {
+/// Without a discovery server, who comes is told of those that live alone: the patience with one is
+/// not tested here.
+TEST(Namesake, IsNotHeardOfOnceItWasKilled) {
   const ServiceSetup setup("every");
   {
     const ServerProcess killed(setup.server_arguments());
