@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <vector>
 
 namespace stillmap {
@@ -145,6 +144,14 @@ class Stretches {
     /// Standard deviations.
     Eigen::Vector3d sigmas = Eigen::Vector3d::Zero();
   };
+  /// What fixes say of delay and antenna, the place being eliminated.
+  struct Reduced {
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+    /// Sums over the fixes: of weighted squared residuals, and of the weights.
+    double squared_m2 = 0.0;
+    double weights = 0.0;
+  };
 
   [[nodiscard]] std::size_t begin(std::size_t stretch) const {
     return stretch == 0 ? 0 : ends_[stretch - 1];
@@ -207,6 +214,16 @@ class Stretches {
     return found;
   }
 
+  /// What one stretch says that lies there.
+  [[nodiscard]] Reduced reduced(const std::vector<Place>& places, std::size_t stretch,
+                                const StretchFit& lies, const Eigen::Vector2d& antenna_lidar) const;
+  /// Adds what is known of the antenna.
+  void restrain_antenna(Reduced& all, double variance_m2,
+                        const Eigen::Vector2d& antenna_lidar) const;
+  /// By what the stretches contradict each other; nothing where one alone tells.
+  [[nodiscard]] static std::optional<Eigen::Vector3d> variance_between(
+      const std::vector<Reduced>& stretches, const Eigen::Matrix3d& covariance,
+      const Eigen::Vector3d& solution);
   /// Of delay and antenna, the place of every stretch being eliminated. The delay's variance is
   /// the larger of what the residuals and of what the differences between stretches say.
   [[nodiscard]] std::optional<Equations> normal_equations(const GnssDelay& at) const;
@@ -219,73 +236,91 @@ class Stretches {
   double kernel_m_ = min_kernel_m;
 };
 
-std::optional<Stretches::Equations> Stretches::normal_equations(const GnssDelay& at) const {
-  const auto places = places_at(at.delay_s);
-  std::vector<Eigen::Matrix3d> informations;
-  std::vector<Eigen::Vector3d> gradients;
-  double squared = 0.0, weights = 0.0;
-  for (std::size_t k = 0; k < ends_.size(); ++k) {
-    const auto stretch = fit(places, k, at.antenna_lidar);
-    if (!stretch) continue;
-    Eigen::Matrix3d H_own = Eigen::Matrix3d::Zero(), H_place = Eigen::Matrix3d::Zero(),
-                    H_both = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d b_own = Eigen::Vector3d::Zero(), b_place = Eigen::Vector3d::Zero();
-    for (std::size_t i = begin(k); i < ends_[k]; ++i) {
-      if (!places[i].is_known) continue;
-      const Eigen::Vector2d r = residual(*stretch, places[i], i, at.antenna_lidar);
-      const double w = weight(r);
-      const Eigen::Vector2d turned = fixes_[i].position_enu - r - stretch->t_enu_odom;
-      Matrix23 J_own, J_place;
-      J_own << -stretch->R_enu_odom * places[i].velocity_odom,
-          stretch->R_enu_odom * places[i].axes_odom;
-      J_place << Eigen::Vector2d(-turned.y(), turned.x()), Eigen::Matrix2d::Identity();
-      H_own += w * J_own.transpose() * J_own;
-      H_both += w * J_own.transpose() * J_place;
-      H_place += w * J_place.transpose() * J_place;
-      b_own += w * J_own.transpose() * r;
-      b_place += w * J_place.transpose() * r;
-      squared += w * r.squaredNorm();
-      weights += w;
-    }
-    const Eigen::Matrix3d eliminated = H_place.ldlt().solve(H_both.transpose()).transpose();
-    informations.emplace_back(H_own - eliminated * H_both.transpose());
-    gradients.emplace_back(b_own - eliminated * b_place);
+Stretches::Reduced Stretches::reduced(const std::vector<Place>& places, std::size_t stretch,
+                                      const StretchFit& lies,
+                                      const Eigen::Vector2d& antenna_lidar) const {
+  Reduced reduced;
+  Eigen::Matrix3d H_place = Eigen::Matrix3d::Zero(), H_both = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b_place = Eigen::Vector3d::Zero();
+  for (std::size_t i = begin(stretch); i < ends_[stretch]; ++i) {
+    if (!places[i].is_known) continue;
+    const Eigen::Vector2d r = residual(lies, places[i], i, antenna_lidar);
+    const double w = weight(r);
+    const Eigen::Vector2d turned = fixes_[i].position_enu - r - lies.t_enu_odom;
+    Matrix23 J_own, J_place;
+    J_own << -lies.R_enu_odom * places[i].velocity_odom, lies.R_enu_odom * places[i].axes_odom;
+    J_place << Eigen::Vector2d(-turned.y(), turned.x()), Eigen::Matrix2d::Identity();
+    reduced.information += w * J_own.transpose() * J_own;
+    reduced.gradient += w * J_own.transpose() * r;
+    H_both += w * J_own.transpose() * J_place;
+    H_place += w * J_place.transpose() * J_place;
+    b_place += w * J_place.transpose() * r;
+    reduced.squared_m2 += w * r.squaredNorm();
+    reduced.weights += w;
   }
-  if (informations.empty()) return std::nullopt;
-  const double variance_m2 = squared / weights;
-  Eigen::Matrix3d H =
-      std::reduce(informations.begin(), informations.end(), Eigen::Matrix3d::Zero().eval());
-  Eigen::Vector3d b =
-      std::reduce(gradients.begin(), gradients.end(), Eigen::Vector3d::Zero().eval());
+  const Eigen::Matrix3d eliminated = H_place.ldlt().solve(H_both.transpose()).transpose();
+  reduced.information -= eliminated * H_both.transpose();
+  reduced.gradient -= eliminated * b_place;
+  return reduced;
+}
+
+void Stretches::restrain_antenna(Reduced& all, double variance_m2,
+                                 const Eigen::Vector2d& antenna_lidar) const {
   if (config_.antenna_sigma_m > 0.0) {
     const double prior =
         correlated_fixes * variance_m2 / (config_.antenna_sigma_m * config_.antenna_sigma_m);
-    H.diagonal().tail<2>().array() += prior;
-    b.tail<2>() -= prior * at.antenna_lidar;
-  } else {
-    H.row(1).setZero(), H.col(1).setZero(), H.row(2).setZero(), H.col(2).setZero();
-    H(1, 1) = H(2, 2) = 1.0;
-    b.tail<2>().setZero();
+    all.information.diagonal().tail<2>().array() += prior;
+    all.gradient.tail<2>() -= prior * antenna_lidar;
+    return;
   }
-  // Too little information to divide by, as on one straight way.
-  constexpr double least_m2_per_s2 = 1e-6;
-  const Eigen::Matrix3d covariance = H.inverse();
-  if (!covariance.allFinite() || !(covariance(0, 0) * least_m2_per_s2 < 1.0)) return std::nullopt;
-  Equations equations{.solution = covariance * b};
+  Eigen::Matrix3d& H = all.information;
+  H.row(1).setZero(), H.col(1).setZero(), H.row(2).setZero(), H.col(2).setZero();
+  H(1, 1) = H(2, 2) = 1.0;
+  all.gradient.tail<2>().setZero();
+}
+
+std::optional<Eigen::Vector3d> Stretches::variance_between(const std::vector<Reduced>& stretches,
+                                                           const Eigen::Matrix3d& covariance,
+                                                           const Eigen::Vector3d& solution) {
   Eigen::Vector3d between = Eigen::Vector3d::Zero();
   double sum = 0.0, sum_of_squares = 0.0;
   const Eigen::Vector3d row = covariance.row(0);
-  for (std::size_t k = 0; k < informations.size(); ++k) {
-    const Eigen::Vector3d rest = gradients[k] - informations[k] * equations.solution;
-    between += (covariance * rest).cwiseAbs2();
-    const double share = row.dot(informations[k] * row) / covariance(0, 0);
+  for (const Reduced& one : stretches) {
+    between += (covariance * (one.gradient - one.information * solution)).cwiseAbs2();
+    const double share = row.dot(one.information * row) / covariance(0, 0);
     sum += share;
     sum_of_squares += share * share;
   }
-  const double stretches = sum * sum / sum_of_squares;
-  if (stretches < min_stretches) return std::nullopt;
+  const double count = sum * sum / sum_of_squares;
+  if (count < min_stretches) return std::nullopt;
+  return between * count / (count - 1.0);
+}
+
+std::optional<Stretches::Equations> Stretches::normal_equations(const GnssDelay& at) const {
+  const auto places = places_at(at.delay_s);
+  std::vector<Reduced> stretches;
+  Reduced all;
+  for (std::size_t k = 0; k < ends_.size(); ++k) {
+    const auto lies = fit(places, k, at.antenna_lidar);
+    if (!lies) continue;
+    const Reduced& one = stretches.emplace_back(reduced(places, k, *lies, at.antenna_lidar));
+    all.information += one.information;
+    all.gradient += one.gradient;
+    all.squared_m2 += one.squared_m2;
+    all.weights += one.weights;
+  }
+  if (stretches.empty()) return std::nullopt;
+  const double variance_m2 = all.squared_m2 / all.weights;
+  restrain_antenna(all, variance_m2, at.antenna_lidar);
+  // Too little information to divide by, as on one straight way.
+  constexpr double least_m2_per_s2 = 1e-6;
+  const Eigen::Matrix3d covariance = all.information.inverse();
+  if (!covariance.allFinite() || !(covariance(0, 0) * least_m2_per_s2 < 1.0)) return std::nullopt;
+  Equations equations{.solution = covariance * all.gradient};
+  const auto between = variance_between(stretches, covariance, equations.solution);
+  if (!between) return std::nullopt;
   const Eigen::Vector3d within = correlated_fixes * variance_m2 * covariance.diagonal();
-  equations.sigmas = (between * stretches / (stretches - 1.0)).cwiseMax(within).cwiseSqrt();
+  equations.sigmas = between->cwiseMax(within).cwiseSqrt();
   return equations;
 }
 

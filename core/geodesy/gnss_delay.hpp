@@ -25,8 +25,8 @@ struct PlanFix {
 };
 
 struct GnssDelayConfig {
-  /// Receivers that send GPS time are 18 s ahead of UTC [s].
-  double max_delay_s = 25.0;
+  /// Receivers that send GPS time are 18 s ahead of UTC; lidars that have TAI, as by PTP, 37 s [s].
+  double max_delay_s = 40.0;
   /// Standard deviation of where the antenna is, along x and y of the lidar; 0: that is known [m].
   double antenna_sigma_m = 0.0;
 };

@@ -68,7 +68,7 @@ Heard driven(const Course& course, double duration_s, double delay_s, double sig
 }
 
 TEST(GnssDelay, IsFoundByTurnsAndStops) {
-  for (const double delay_s : {0.0, 0.05, 0.1, 0.3, -0.5, 18.0, -18.0}) {
+  for (const double delay_s : {0.0, 0.033, 0.05, 0.27, 0.3, -0.5, 17.77, 18.0, -18.0, 37.02}) {
     const Heard heard = driven(town, 150.0, delay_s, 0.02);
     const auto found = estimate_delay(heard.way, heard.fixes);
     ASSERT_TRUE(found) << delay_s;
@@ -85,6 +85,27 @@ TEST(GnssDelay, IsAsSureAsItIsRight) {
     ASSERT_TRUE(found) << delay_s;
     EXPECT_LT(std::abs(found->delay_s - delay_s), 3.0 * found->sigma_s);
     EXPECT_LT(found->sigma_s, 0.1);
+  }
+}
+
+// As of a receiver without corrections: what it errs by stays the same for a minute.
+TEST(GnssDelay, IsAsSureAsItIsRightOfAReceiverThatWanders) {
+  for (const double delay_s : {0.0, 0.27, 17.77}) {
+    Heard heard = driven(town, 400.0, delay_s, 0.1);
+    std::mt19937 random(9);
+    constexpr double sigma_m = 1.5, correlation_s = 60.0, step_s = 0.2;
+    std::normal_distribution<double> step(0.0, sigma_m * std::sqrt(2.0 * step_s / correlation_s));
+    Eigen::Vector2d error_m(sigma_m, -sigma_m);
+    for (PlanFix& fix : heard.fixes) {
+      error_m =
+          (1.0 - step_s / correlation_s) * error_m + Eigen::Vector2d(step(random), step(random));
+      fix.position_enu += error_m;
+      fix.sigma_m = sigma_m;
+    }
+    const auto found = estimate_delay(heard.way, heard.fixes);
+    ASSERT_TRUE(found) << delay_s;
+    EXPECT_LT(std::abs(found->delay_s - delay_s), 3.0 * found->sigma_s) << delay_s;
+    EXPECT_LT(found->sigma_s, 0.1) << delay_s;
   }
 }
 
