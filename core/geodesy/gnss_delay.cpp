@@ -38,6 +38,13 @@ constexpr double as_good_share = 0.95;
 /// One stretch alone could be a fault of the receiver.
 constexpr double min_stretches = 2.0;
 
+/// A delay, or an antenna, is another one by so much, and so many standard deviations. One that is
+/// known to be there is found out better.
+constexpr double min_delay_s = 0.02;
+constexpr double min_antenna_m = 0.3;
+constexpr double sigmas_of_another = 4.0;
+constexpr double sigmas_of_better = 2.0;
+
 /// Of the way at one time.
 struct Place {
   Eigen::Vector2d antenna_odom = Eigen::Vector2d::Zero();
@@ -377,6 +384,25 @@ std::optional<GnssDelay> estimate_delay(std::span<const PlanPose> way,
       best_s = candidate.delay_s;
   }
   return stretches.refined(best_s);
+}
+
+std::optional<GnssDelay> revised(const GnssDelay& known, GnssDelay found) {
+  const auto is_another = [](double by, double least, double sigma, bool is_known) {
+    return by > std::max(least, (is_known ? sigmas_of_better : sigmas_of_another) * sigma);
+  };
+  const bool knows_delay = known.delay_s != 0.0, knows_antenna = !known.antenna_lidar.isZero();
+  const bool is_other_delay =
+      is_another(std::abs(found.delay_s - known.delay_s), min_delay_s, found.sigma_s, knows_delay);
+  const bool is_other_antenna = is_another((found.antenna_lidar - known.antenna_lidar).norm(),
+                                           min_antenna_m, found.antenna_sigma_m, knows_antenna);
+  if (!is_other_delay && !is_other_antenna) return std::nullopt;
+  if ((is_other_delay || !knows_delay) &&
+      !is_another(std::abs(found.delay_s), min_delay_s, found.sigma_s, false))
+    found.delay_s = 0.0;
+  if ((is_other_antenna || !knows_antenna) &&
+      !is_another(found.antenna_lidar.norm(), min_antenna_m, found.antenna_sigma_m, false))
+    found.antenna_lidar.setZero();
+  return found;
 }
 
 }  // namespace stillmap

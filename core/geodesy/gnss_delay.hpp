@@ -50,4 +50,9 @@ struct GnssDelay {
                                                       std::span<const PlanFix> fixes,
                                                       const GnssDelayConfig& config = {});
 
+/// What is used from now on, where `found` says clearly that it is not what is `known` until now;
+/// else nothing. A delay or antenna that may be none is none, unless one is known already and what
+/// was found does not contradict that.
+[[nodiscard]] std::optional<GnssDelay> revised(const GnssDelay& known, GnssDelay found);
+
 }  // namespace stillmap

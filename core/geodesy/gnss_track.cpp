@@ -11,8 +11,8 @@ namespace {
 /// More than an hour at 10 Hz of a robot that moves.
 constexpr std::size_t max_scans = 50'000;
 constexpr std::size_t max_known = 50'000;
-/// Of stamps ahead of the scans, half a minute at 100 Hz.
-constexpr std::size_t max_waiting = 3000;
+/// Of stamps ahead of the scans, 50 s at 100 Hz.
+constexpr std::size_t max_waiting = 5000;
 /// Between scans that are farther apart than both nobody knows where the antenna was.
 constexpr std::int64_t max_gap_ns = 1'500'000'000;
 constexpr double max_gap_m = 0.5;
@@ -30,12 +30,8 @@ constexpr std::int64_t min_apart_ns = 1'000'000'000;
 /// The delay is judged after so much more way, and so much as a share of all.
 constexpr double judged_way_m = 50.0;
 constexpr double judged_share_of_way = 0.25;
-/// A delay, or an antenna, is another one by so much, and so many standard deviations. One that is
-/// known to be there is found out better.
-constexpr double min_delay_s = 0.02;
-constexpr double min_antenna_m = 0.3;
-constexpr double sigmas_of_another = 4.0;
-constexpr double sigmas_of_better = 2.0;
+/// A robot that was never farther than this from where it began stands there still [m].
+constexpr double max_standing_m = 1.0;
 
 double horizontal_sigma_m(const GnssFix& fix) {
   return std::sqrt(0.5 * fix.covariance_enu.topLeftCorner<2, 2>().trace());
@@ -82,7 +78,9 @@ void GnssTrack::remember(const GnssFix& fix) {
       distance_m(known_.back(), fix) < min_moved_m)
     return;
   known_.push_back(fix);
-  if (known_.size() > max_known) known_.pop_front();
+  if (known_.size() <= max_known) return;
+  forget_way(known_.front().stamp_ns);
+  known_.pop_front();
 }
 
 void GnssTrack::judge_origin(const GnssFix& fix) {
@@ -121,12 +119,22 @@ void GnssTrack::add_scan(std::size_t scan, std::int64_t stamp_ns,
     misplaced_ += waiting_.size();
     waiting_.clear();
     known_.clear();
+    has_forgotten_way_ |= left_ns_.has_value();
   }
+  const Eigen::Vector3d at_odom = T_odom_lidar.translation();
+  if (!begin_odom_) begin_odom_ = at_odom;
+  if (!left_ns_ && (at_odom - *begin_odom_).norm() > max_standing_m) left_ns_ = stamp_ns;
   if (!scans_.empty()) {
-    way_m_ += (T_odom_lidar.translation() - scans_.back().T_odom_lidar.translation()).norm();
+    way_m_ += (at_odom - scans_.back().T_odom_lidar.translation()).norm();
   }
   scans_.push_back({scan, stamp_ns, T_odom_lidar, antenna_lidar});
-  if (scans_.size() > max_scans) scans_.pop_front();
+  if (scans_.size() <= max_scans) return;
+  forget_way(scans_.front().stamp_ns);
+  scans_.pop_front();
+}
+
+void GnssTrack::forget_way(std::int64_t stamp_ns) {
+  has_forgotten_way_ |= left_ns_ && stamp_ns >= *left_ns_;
 }
 
 std::vector<PositionAtScan> GnssTrack::take() {
@@ -148,26 +156,14 @@ std::vector<PositionAtScan> GnssTrack::take() {
 }
 
 bool GnssTrack::judge_delay(bool is_end) {
-  if (config_.delay_s || !enu_ || (!is_end && way_m_ < next_judged_m_)) return false;
+  if (config_.delay_s || !enu_ || has_forgotten_way_ || (!is_end && way_m_ < next_judged_m_))
+    return false;
   next_judged_m_ = way_m_ + std::max(judged_way_m, judged_share_of_way * way_m_);
-  auto found = estimated_delay();
+  const auto found = estimated_delay();
   if (!found) return false;
-  // What may be none is none.
-  if (std::abs(found->delay_s) < std::max(min_delay_s, sigmas_of_another * found->sigma_s))
-    found->delay_s = 0.0;
-  if (found->antenna_lidar.norm() <
-      std::max(min_antenna_m, sigmas_of_another * found->antenna_sigma_m))
-    found->antenna_lidar.setZero();
-  const auto is_another = [](double by, double least, double sigma, bool is_known) {
-    return by > std::max(least, (is_known ? sigmas_of_better : sigmas_of_another) * sigma);
-  };
-  const bool is_other_delay = is_another(std::abs(found->delay_s - delay_.delay_s), min_delay_s,
-                                         found->sigma_s, delay_.delay_s != 0.0);
-  const bool is_other_antenna =
-      is_another((found->antenna_lidar - delay_.antenna_lidar).norm(), min_antenna_m,
-                 found->antenna_sigma_m, !delay_.antenna_lidar.isZero());
-  if (!is_other_delay && !is_other_antenna) return false;
-  delay_ = *found;
+  const auto other = revised(delay_, *found);
+  if (!other) return false;
+  delay_ = *other;
   waiting_ = known_;
   placed_ = misplaced_ = 0;
   return true;

@@ -62,7 +62,8 @@ class GnssTrack {
   [[nodiscard]] std::vector<PositionAtScan> take();
   /// Finds out how late the stamps are, now and then as the way grows; `is_end`: of all of it.
   /// Returns whether that is another delay, or another antenna, than until now: then the positions
-  /// that were taken before mean nothing any more, and take() has all of them again.
+  /// that were taken before mean nothing any more, and take() has all of them again. So it stays
+  /// what it is once some of the way is no longer kept: of 50,000 scans and as many fixes.
   [[nodiscard]] bool judge_delay(bool is_end = false);
   /// Found out until now.
   [[nodiscard]] const GnssDelay& delay() const { return delay_; }
@@ -91,6 +92,8 @@ class GnssTrack {
   void begin_at(const GnssFix& fix);
   /// Keeps it for another delay.
   void remember(const GnssFix& fix);
+  /// What was there then is no longer kept. Of a robot that stood nothing is lost by that.
+  void forget_way(std::int64_t stamp_ns);
   [[nodiscard]] std::optional<GnssDelay> estimated_delay() const;
   [[nodiscard]] std::optional<PositionAtScan> between_scans(const GnssFix& fix) const;
   /// When the robot was there.
@@ -112,6 +115,11 @@ class GnssTrack {
   /// The newest.
   std::deque<ScanPose> scans_;
   GnssDelay delay_;
+  /// Of the first scan, and when the robot had left that place.
+  std::optional<Eigen::Vector3d> begin_odom_;
+  std::optional<std::int64_t> left_ns_;
+  /// Whether positions that were taken could not be had again.
+  bool has_forgotten_way_ = false;
   /// Way of the lidar, and where the delay is judged next [m].
   double way_m_ = 0.0;
   double next_judged_m_ = 100.0;

@@ -129,6 +129,27 @@ TEST(GnssDelay, IsNotKnownWhereSpeedAndTurnAreTheSameAllTheTime) {
   }
 }
 
+// An estimate that is less sure than the one before it says nothing against that.
+TEST(GnssDelay, IsKeptUntilItIsContradicted) {
+  const GnssDelay known{.delay_s = 0.3, .sigma_s = 0.02, .antenna_lidar = {1.0, 0.5}};
+  const auto later = [&](double delay_s, double sigma_s) {
+    GnssDelay found = known;
+    found.delay_s = delay_s;
+    found.sigma_s = sigma_s;
+    return found;
+  };
+  EXPECT_FALSE(revised(known, later(0.28, 0.08)));
+  GnssDelay unsure = later(0.3, 0.02);
+  unsure.antenna_lidar = {0.9, 0.4};
+  unsure.antenna_sigma_m = 0.4;
+  EXPECT_FALSE(revised(known, unsure));
+  EXPECT_DOUBLE_EQ(revised(known, later(0.25, 0.01)).value().delay_s, 0.25);
+  EXPECT_EQ(revised(known, later(0.05, 0.05)).value().delay_s, 0.0) << "there is none after all";
+  EXPECT_EQ(revised(known, later(0.05, 0.05)).value().antenna_lidar, known.antenna_lidar);
+  EXPECT_FALSE(revised({}, {.delay_s = 0.28, .sigma_s = 0.08})) << "not known yet";
+  EXPECT_DOUBLE_EQ(revised({}, {.delay_s = 0.28, .sigma_s = 0.02}).value().delay_s, 0.28);
+}
+
 TEST(GnssDelay, NothingTellsNothing) {
   EXPECT_FALSE(estimate_delay({}, {}));
   const Heard heard = driven(town, 5.0, 0.1, 0.02);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -119,7 +120,7 @@ TEST_F(GnssTracks, RefusesBadFixesAndBelievesNoneTooMuch) {
 }
 
 TEST_F(GnssTracks, WithoutScansItDoesNotGrow) {
-  for (int k = 0; k < 5000; ++k) ASSERT_EQ(track_.add(fix_at(k)), "");
+  for (int k = 0; k < 7000; ++k) ASSERT_EQ(track_.add(fix_at(k)), "");
   EXPECT_EQ(track_.misplaced(), 2000U);
 }
 
@@ -221,6 +222,37 @@ TEST(GnssTrack, StampsThatAreLateArePutRight) {
   EXPECT_NEAR(track.delay().delay_s, 0.4, 0.01);
   EXPECT_LT(worst_m, 0.5);
   EXPECT_LT(told_m, 0.5);
+}
+
+/// Whether a delay is found of a robot that first stands, then goes straight, then turns and stops.
+bool finds_delay_after(int standing_scans, int straight_scans) {
+  GnssTrack track{GnssConfig{}};
+  const int turning_scans = 1000;
+  for (int k = -standing_scans; k < straight_scans + turning_scans; ++k) {
+    const double time_s = 0.1 * k, straight_s = 0.1 * straight_scans;
+    const auto T_at = [&](double s) -> Eigen::Isometry3d {
+      const double east_m = std::clamp(s, 0.0, straight_s);
+      return Eigen::Translation3d(east_m, 0.0, 0.0) *
+             T_odom_lidar_at(driving_s(std::max(s - straight_s, 0.0)));
+    };
+    if (k % 20 == 0 || k > straight_scans) {
+      GnssFix fix = earth.fix_at(T_at(time_s) * antenna_lidar);
+      fix.stamp_ns = std::llround((time_s + 0.4) * 1e9);
+      fix.covariance_enu = Eigen::Vector3d::Constant(0.02 * 0.02).asDiagonal();
+      EXPECT_EQ(track.add(fix), "");
+    }
+    track.add_scan(static_cast<std::size_t>(k + standing_scans), std::llround(time_s * 1e9),
+                   T_at(time_s), antenna_lidar);
+    static_cast<void>(track.take());
+  }
+  return track.judge_delay(true);
+}
+
+// Positions of what is no longer kept could not be had again by another delay.
+TEST(GnssTrack, TheDelayStaysOnceTheBeginningOfTheWayIsForgotten) {
+  EXPECT_TRUE(finds_delay_after(0, 2000));
+  EXPECT_FALSE(finds_delay_after(0, 51'000));
+  EXPECT_TRUE(finds_delay_after(51'000, 2000)) << "there was no way before";
 }
 
 }  // namespace
