@@ -73,7 +73,12 @@ void LoopCloser::add_node(std::size_t scan, const Eigen::Isometry3d& T_odom_lida
 }
 
 void LoopCloser::finish() {
-  if (!builder_.empty()) close_submap();
+  if (!builder_.empty()) {
+    close_submap();
+  } else {
+    // Positions may have come, or been put elsewhere, after the last submap was closed.
+    use_positions();
+  }
   for (Candidate& candidate : pending_) refuse(std::move(candidate), stayed_alone);
   pending_.clear();
 }

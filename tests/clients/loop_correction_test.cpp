@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <set>
+#include <vector>
 
 #include "core/dataset/dataset_error.hpp"
 #include "tests/graph/street_world.hpp"
@@ -100,6 +103,68 @@ TEST_F(StretchThatHasWaited, StaysOutAtTheEndOfTheDrive) {
   drive(loops, 0, end, MapEntry::enters);
   EXPECT_FALSE(loops.finish());
   EXPECT_EQ(loops.T_map_lidar().size(), std::size_t{end});
+}
+
+/// A robot that goes 5 m/s along bends and stands for 4 s of every 12.
+Eigen::Isometry3d T_odom_lidar_at(double time_s) {
+  const double lap = std::floor(time_s / 12.0);
+  const double moved_s = 8.0 * lap + std::min(8.0, time_s - 12.0 * lap);
+  const double heading_rad = std::sin(0.4 * moved_s);
+  return Eigen::Translation3d(5.0 * moved_s, 10.0 * std::sin(0.4 * moved_s), 0.0) *
+         Eigen::AngleAxisd(heading_rad, Eigen::Vector3d::UnitZ());
+}
+
+std::int64_t stamp_ns_at(int k) { return 100'000'000 * (std::int64_t{k} + 1); }
+
+MappedScan mapped_at(int k) {
+  MappedScan mapped;
+  mapped.odometry.T_map_lidar = T_odom_lidar_at(0.1 * k);
+  mapped.odometry.map_entry = MapEntry::enters;
+  for (int i = 0; i < 40; ++i)
+    mapped.labelled.scan.points_lidar.emplace_back(static_cast<float>(i % 8), 5.0F,
+                                                   0.2F * static_cast<float>(i / 8));
+  mapped.labelled.motion.assign(mapped.labelled.scan.size(), Motion::stationary);
+  mapped.labelled.scan.stamp_ns = stamp_ns_at(k);
+  return mapped;
+}
+
+// How late the stamps are may be known only at the end, when no submap is left to be closed.
+TEST(LoopCorrectionOfLateStamps, KeepsThePositionsOfADriveThatEndsWithASubmap) {
+  constexpr double delay_s = 0.4;
+  constexpr int most_scans = 2000;
+  const EastNorthUp earth(49.0, 8.4, 115.0);
+  std::vector<GnssFix> fixes;
+  // So that there are three stretches of 100 m, which tell a delay, between two looks at it.
+  constexpr int first_fix = 60;
+  for (int k = first_fix; k < most_scans; k += 2) {
+    GnssFix fix = earth.fix_at(T_odom_lidar_at(0.1 * k).translation());
+    fix.stamp_ns = stamp_ns_at(k) + std::llround(1e9 * delay_s);
+    fix.covariance_enu = Eigen::Vector3d::Constant(0.02 * 0.02).asDiagonal();
+    fixes.push_back(fix);
+  }
+  const ScratchFolder scratch;
+  LoopOptions options{scratch / "scans", 0.0, {}, {}};
+  options.gnss.fixes = fixes;
+  LoopCorrection loops(options, vlp_16());
+  double way_m = 0.0;
+  bool is_submap_closed = false;
+  int k = 0;
+  for (; k < most_scans && (way_m < 345.0 || !is_submap_closed); ++k) {
+    if (k > 0)
+      way_m +=
+          (T_odom_lidar_at(0.1 * k).translation() - T_odom_lidar_at(0.1 * (k - 1)).translation())
+              .norm();
+    const std::size_t submaps = loops.report().submaps;
+    loops.add(static_cast<std::size_t>(k), mapped_at(k));
+    is_submap_closed = loops.report().submaps > submaps;
+  }
+  ASSERT_LT(way_m, 380.0);
+  ASSERT_EQ(loops.report().gnss.value().delay.delay_s, 0.0) << "not known before the end";
+  EXPECT_TRUE(loops.finish());
+  const GnssReport gnss = loops.report().gnss.value();
+  EXPECT_NEAR(gnss.delay.delay_s, delay_s, 0.05);
+  EXPECT_GT(gnss.positions.used, 20U);
+  EXPECT_TRUE(gnss.datum);
 }
 
 }  // namespace

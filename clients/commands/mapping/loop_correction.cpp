@@ -115,7 +115,7 @@ bool LoopCorrection::finish() {
   close_waiting(MapEntry::stays_out_with_waiting);
   // Stamps may be late: the last ones belong to scans before them.
   add_fixes(std::numeric_limits<std::int64_t>::max());
-  if (gnss_.judge_delay(true)) closer_.replace_positions({});
+  if (gnss_.judge_delay(true)) closer_.replace_positions(gnss_.take());
   for (const PositionAtScan& position : gnss_.take()) closer_.add(position);
   closer_.finish();
   T_map_lidar_ = closer_.corrected_poses();
