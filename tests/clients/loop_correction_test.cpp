@@ -128,23 +128,27 @@ MappedScan mapped_at(int k) {
   return mapped;
 }
 
-// How late the stamps are may be known only at the end, when no submap is left to be closed.
-TEST(LoopCorrectionOfLateStamps, KeepsThePositionsOfADriveThatEndsWithASubmap) {
-  constexpr double delay_s = 0.4;
-  constexpr int most_scans = 2000;
+std::vector<GnssFix> fixes_of(int first_scan, int end, double delay_s) {
   const EastNorthUp earth(49.0, 8.4, 115.0);
   std::vector<GnssFix> fixes;
-  // So that there are three stretches of 100 m, which tell a delay, between two looks at it.
-  constexpr int first_fix = 60;
-  for (int k = first_fix; k < most_scans; k += 2) {
+  for (int k = first_scan; k < end; k += 2) {
     GnssFix fix = earth.fix_at(T_odom_lidar_at(0.1 * k).translation());
     fix.stamp_ns = stamp_ns_at(k) + std::llround(1e9 * delay_s);
     fix.covariance_enu = Eigen::Vector3d::Constant(0.02 * 0.02).asDiagonal();
     fixes.push_back(fix);
   }
+  return fixes;
+}
+
+// How late the stamps are may be known only at the end, when no submap is left to be closed.
+TEST(LoopCorrectionOfLateStamps, KeepsThePositionsOfADriveThatEndsWithASubmap) {
+  constexpr double delay_s = 0.4;
+  constexpr int most_scans = 2000;
+  // So that there are three stretches of 100 m, which tell a delay, between two looks at it.
+  constexpr int first_fix = 60;
   const ScratchFolder scratch;
   LoopOptions options{scratch / "scans", 0.0, {}, {}};
-  options.gnss.fixes = fixes;
+  options.gnss.fixes = fixes_of(first_fix, most_scans, delay_s);
   LoopCorrection loops(options, vlp_16());
   double way_m = 0.0;
   bool is_submap_closed = false;
@@ -165,6 +169,28 @@ TEST(LoopCorrectionOfLateStamps, KeepsThePositionsOfADriveThatEndsWithASubmap) {
   EXPECT_NEAR(gnss.delay.delay_s, delay_s, 0.05);
   EXPECT_GT(gnss.positions.used, 20U);
   EXPECT_TRUE(gnss.datum);
+}
+
+// Of a part of a drive, as of the first scans of many: the rest went on in another country.
+TEST(LoopCorrectionOfAPart, LeavesOutFixesOfTheRest) {
+  constexpr int begin_scan = 2000, end_scan = 2200;
+  const ScratchFolder scratch;
+  LoopOptions options{scratch / "scans", 0.0, {}, {}};
+  options.gnss.fixes = fixes_of(begin_scan, end_scan, 0.0);
+  for (GnssFix fix : fixes_of(0, 1000, 0.0)) {
+    fix.latitude_deg = 10.0;
+    options.gnss.fixes.push_back(fix);
+    fix.latitude_deg = 20.0;
+    fix.stamp_ns += stamp_ns_at(end_scan + 500);
+    options.gnss.fixes.push_back(fix);
+  }
+  LoopCorrection loops(options, vlp_16());
+  for (int k = begin_scan; k < end_scan; ++k) loops.add(static_cast<std::size_t>(k), mapped_at(k));
+  EXPECT_TRUE(loops.finish());
+  const GnssReport gnss = loops.report().gnss.value();
+  EXPECT_GT(gnss.positions.used, 5U);
+  ASSERT_TRUE(gnss.datum);
+  EXPECT_NEAR(gnss.datum->latitude_deg, 49.0, 0.1);
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "core/dataset/dataset_error.hpp"
@@ -27,6 +26,9 @@ class Timed {
   std::chrono::steady_clock::time_point began_;
 };
 
+/// By so much more than stamps may be off fixes are looked for before the first scan and after the
+/// last one [s].
+constexpr double beyond_scans_s = 5.0;
 constexpr double bytes_per_mib = 1024.0 * 1024.0;
 
 }  // namespace
@@ -34,6 +36,8 @@ constexpr double bytes_per_mib = 1024.0 * 1024.0;
 LoopCorrection::LoopCorrection(LoopOptions options, const SensorModel& sensor)
     : fixes_(std::move(options.gnss.fixes)),
       antenna_lidar_(options.gnss.antenna_lidar),
+      reach_ns_(std::llround(1e9 * (beyond_scans_s + std::abs(options.gnss.config.delay_s.value_or(
+                                                         GnssDelayConfig{}.max_delay_s))))),
       gnss_(options.gnss.config),
       sensor_(sensor),
       scans_file_(options.scans_file),
@@ -92,12 +96,18 @@ void LoopCorrection::close(std::size_t place, const LabelledScan& scan, bool ent
   enters_.push_back(enters);
   const std::int64_t stamp_ns = scan.scan.stamp_ns;
   const Eigen::Isometry3d& T_odom_lidar = T_odom_lidar_[place];
+  if (place == 0) skip_fixes(stamp_ns - reach_ns_);
+  last_stamp_ns_ = stamp_ns;
   if (gnss_.judge_delay()) closer_.replace_positions(gnss_.take());
   closer_.add(scan, T_odom_lidar, enters, index_[place]);
   add_fixes(stamp_ns);
   if (!enters) return;
   gnss_.add_scan(place, stamp_ns, T_odom_lidar, antenna_lidar_);
   for (const PositionAtScan& position : gnss_.take()) closer_.add(position);
+}
+
+void LoopCorrection::skip_fixes(std::int64_t until_ns) {
+  while (next_fix_ < fixes_.size() && fixes_[next_fix_].stamp_ns < until_ns) ++next_fix_;
 }
 
 void LoopCorrection::add_fixes(std::int64_t until_ns) {
@@ -113,8 +123,9 @@ void LoopCorrection::add_fixes(std::int64_t until_ns) {
 bool LoopCorrection::finish() {
   const Timed timed(seconds_);
   close_waiting(MapEntry::stays_out_with_waiting);
-  // Stamps may be late: the last ones belong to scans before them.
-  add_fixes(std::numeric_limits<std::int64_t>::max());
+  // Stamps may be late: the last ones belong to scans before them. What comes after them is of
+  // another part of the drive, which is not mapped.
+  if (!enters_.empty()) add_fixes(last_stamp_ns_ + reach_ns_);
   if (gnss_.judge_delay(true)) closer_.replace_positions(gnss_.take());
   for (const PositionAtScan& position : gnss_.take()) closer_.add(position);
   closer_.finish();

@@ -112,6 +112,8 @@ class LoopCorrection {
            MapEntry entry);
   /// Hands those to the closer that have waited for this entry.
   void close_waiting(MapEntry entry);
+  /// Leaves out those with stamps before that.
+  void skip_fixes(std::int64_t until_ns);
   /// Those with stamps until then.
   void add_fixes(std::int64_t until_ns);
   /// Hands a scan to the closer, with the fixes until then.
@@ -124,6 +126,10 @@ class LoopCorrection {
   std::string refusal_;
   std::size_t refused_fixes_ = 0;
   Eigen::Vector3d antenna_lidar_;
+  /// So far from the scans fixes may have their stamps.
+  std::int64_t reach_ns_;
+  /// Of the newest scan that the closer has.
+  std::int64_t last_stamp_ns_ = 0;
   GnssTrack gnss_;
   SensorModel sensor_;
   std::filesystem::path scans_file_;
