@@ -65,10 +65,10 @@ class RegionShape {
 
   /// False for NaN. Exact to a micrometre for polygons, to rounding for the others.
   [[nodiscard]] bool contains(const Eigen::Vector3d& p_map) const;
-  /// The same of a voxel's mean as it is returned. Where both are inlined in a loop, GCC 12
-  /// compares the mean before it is rounded, and a box that begins at a voxel's position misses the
-  /// voxel.
-  [[nodiscard]] bool contains_mean(const Eigen::Vector3f& mean_map) const;
+  /// The same of a voxel's mean as it is returned. Never inlined, in one source with its caller or
+  /// by the linker: in a loop GCC 12 compares the mean before it is rounded, and a box that begins
+  /// at a voxel's position misses the voxel.
+  [[nodiscard, gnu::noinline]] bool contains_mean(const Eigen::Vector3f& mean_map) const;
   /// False only when no position of the box is in the region. The box may be infinitely high.
   [[nodiscard]] bool may_intersect(const Eigen::AlignedBox3d& box_map) const;
   /// True only when the whole box is in the region.
