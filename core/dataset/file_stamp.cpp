@@ -42,6 +42,8 @@ std::optional<std::int64_t> two_numbers(std::string_view text) {
   if (whole != max_digits_of_seconds || whole + 1 >= text.size() || text[whole] != '_') {
     return std::nullopt;
   }
+  // A counter with zeros in front; seconds have ten digits since 2001.
+  if (text.front() == '0') return std::nullopt;
   const std::string_view fraction = text.substr(whole + 1);
   // Others than nine: nobody knows whether zeros are missing in front or behind.
   const bool is_whole = digits_in_front(fraction) == fraction.size();
