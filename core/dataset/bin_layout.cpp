@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,6 +36,10 @@ constexpr double no_noise = 0.01;
 struct Beginning {
   std::vector<char> bytes;
   std::uintmax_t file_bytes = 0;
+  /// Its float32 values, so that near differences count and far ones do not count for more than
+  /// they are. NaN of those that say nothing: infinite ones, and zeros, which stand for missing
+  /// points.
+  std::vector<float> scaled;
 
   template <class T>
   [[nodiscard]] T value(std::size_t offset) const {
@@ -44,6 +49,11 @@ struct Beginning {
   }
 };
 
+float scaled(float value) {
+  if (value == 0.0F || !std::isfinite(value)) return std::numeric_limits<float>::quiet_NaN();
+  return std::clamp(std::asinh(value), -13.0F, 13.0F);
+}
+
 std::vector<Beginning> beginnings_of(std::span<const fs::path> files) {
   std::vector<Beginning> beginnings;
   for (const fs::path& file : files) {
@@ -51,10 +61,13 @@ std::vector<Beginning> beginnings_of(std::span<const fs::path> files) {
     const std::uintmax_t size = fs::file_size(file, error);
     if (error || size == 0) continue;
     Beginning one{.bytes = std::vector<char>(std::min<std::uintmax_t>(size, max_bytes)),
-                  .file_bytes = size};
+                  .file_bytes = size,
+                  .scaled = {}};
     std::ifstream in(file, std::ios::binary);
-    if (in.read(one.bytes.data(), static_cast<std::streamsize>(one.bytes.size())))
-      beginnings.push_back(std::move(one));
+    if (!in.read(one.bytes.data(), static_cast<std::streamsize>(one.bytes.size()))) continue;
+    for (std::size_t at = 0; at + sizeof(float) <= one.bytes.size(); at += sizeof(float))
+      one.scaled.push_back(scaled(one.value<float>(at)));
+    beginnings.push_back(std::move(one));
   }
   return beginnings;
 }
@@ -89,35 +102,62 @@ double noise(const std::vector<Beginning>& files, std::size_t point_bytes, std::
   return seen == 0 ? 1.0 : static_cast<double>(bad) / static_cast<double>(seen);
 }
 
-/// Near differences count, far ones do not count for more than they are.
-double scaled(float value) { return std::clamp(std::asinh(double{value}), -13.0, 13.0); }
-
-/// Mean difference of the float32 values that lie so many values apart; nothing of too few. The
-/// values of a column are alike in any order of the points: a step that mixes columns can never
-/// have the smaller difference. Zeros stand for missing points and say nothing.
-std::optional<double> difference(const std::vector<Beginning>& files, std::size_t step) {
+/// How far float32 values are apart that lie so many values apart.
+struct Differences {
+  /// By the places of the values in KITTI's points: sums, and numbers of pairs.
+  std::array<std::array<double, kitti_values>, kitti_values> sums{};
+  std::array<std::array<double, kitti_values>, kitti_values> pairs{};
   double sum = 0.0;
-  std::size_t pairs = 0;
+  double pair_count = 0.0;
+
+  [[nodiscard]] double mean() const { return sum / pair_count; }
+};
+
+/// Nothing of too few pairs.
+std::optional<Differences> differences(const std::vector<Beginning>& files, std::size_t step) {
+  Differences found;
   for (const Beginning& file : files) {
-    const std::size_t values = file.bytes.size() / sizeof(float);
-    for (std::size_t i = 0; i + step < values; ++i) {
-      const auto a = file.value<float>(i * sizeof(float));
-      const auto b = file.value<float>((i + step) * sizeof(float));
-      if (a == 0.0F || b == 0.0F || !std::isfinite(a) || !std::isfinite(b)) continue;
-      sum += std::abs(scaled(a) - scaled(b));
-      ++pairs;
+    for (std::size_t i = 0; i + step < file.scaled.size(); ++i) {
+      const float apart = std::abs(file.scaled[i] - file.scaled[i + step]);
+      if (std::isnan(apart)) continue;
+      found.sums[i % kitti_values][(i + step) % kitti_values] += double{apart};
+      found.pairs[i % kitti_values][(i + step) % kitti_values] += 1.0;
     }
   }
-  if (pairs < min_pairs) return std::nullopt;
-  return sum / static_cast<double>(pairs);
+  for (std::size_t a = 0; a < kitti_values; ++a) {
+    for (std::size_t b = 0; b < kitti_values; ++b) {
+      found.sum += found.sums[a][b];
+      found.pair_count += found.pairs[a][b];
+    }
+  }
+  if (found.pair_count < static_cast<double>(min_pairs)) return std::nullopt;
+  return found;
 }
 
 /// The same from a point to the next, or to the one after it, where two beams take turns.
-std::optional<double> difference_of_points(const std::vector<Beginning>& files,
-                                           std::size_t values) {
-  const auto next = difference(files, values), second = difference(files, 2 * values);
+std::optional<Differences> differences_of_points(const std::vector<Beginning>& files,
+                                                 std::size_t values) {
+  const auto next = differences(files, values), second = differences(files, 2 * values);
   if (!next || !second) return std::nullopt;
-  return std::min(*next, *second);
+  return next->mean() < second->mean() ? next : second;
+}
+
+/// How much farther apart values are than they would be if the points were KITTI's, in no order:
+/// below 1 they are of another layout. In any order two values of one column are as far apart on
+/// average as the column's are, and of two columns no less than the mean of both. Columns of which
+/// little is there, as an intensity that is 0, have as little weight here as they have there: else
+/// leaving them out would look like a better layout.
+double relative_to_kitti(const Differences& found, const Differences& as_kitti) {
+  const auto of_column = [&](std::size_t k) {
+    return as_kitti.pairs[k][k] > 0.0 ? as_kitti.sums[k][k] / as_kitti.pairs[k][k]
+                                      : as_kitti.mean();
+  };
+  double expected = 0.0;
+  for (std::size_t a = 0; a < kitti_values; ++a) {
+    for (std::size_t b = 0; b < kitti_values; ++b)
+      expected += found.pairs[a][b] * 0.5 * (of_column(a) + of_column(b));
+  }
+  return expected > 0.0 ? found.sum / expected : 1.0;
 }
 
 /// Whether every fifth value is a ring's number.
@@ -134,13 +174,13 @@ bool has_rings(const std::vector<Beginning>& files) {
 }
 
 bool is_nuscenes(std::span<const fs::path> names, const std::vector<Beginning>& files,
-                 const std::optional<double>& as_kitti) {
+                 const std::optional<Differences>& as_kitti) {
   if (!fits_sizes(files, nuscenes_bytes) || !has_rings(files)) return false;
   const bool is_named = std::ranges::all_of(
       names, [](const fs::path& name) { return name.string().ends_with(".pcd.bin"); });
-  const auto as_nuscenes = difference_of_points(files, nuscenes_values);
+  const auto as_nuscenes = differences_of_points(files, nuscenes_values);
   if (!as_kitti || !as_nuscenes) return is_named;
-  return *as_nuscenes < (is_named ? 1.0 : clearly_better) * *as_kitti;
+  return relative_to_kitti(*as_nuscenes, *as_kitti) < (is_named ? 1.0 : clearly_better);
 }
 
 /// How points are laid out that are not as KITTI's, and numpy's words that make them so.
@@ -166,10 +206,8 @@ bool are_two_of_three(const std::vector<Beginning>& files) {
   if (!fits_sizes(files, values * sizeof(float))) return true;
   std::array<double, values> sums{};
   for (const Beginning& file : files) {
-    for (std::size_t i = 0; (i + 1) * sizeof(float) <= file.bytes.size(); ++i) {
-      const auto value = file.value<float>(i * sizeof(float));
-      if (std::isfinite(value)) sums[i % values] += std::abs(scaled(value));
-    }
+    for (std::size_t i = 0; i < file.scaled.size(); ++i)
+      if (!std::isnan(file.scaled[i])) sums[i % values] += std::abs(double{file.scaled[i]});
   }
   constexpr double alike = 1.25;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -180,16 +218,19 @@ bool are_two_of_three(const std::vector<Beginning>& files) {
 }
 
 /// Where most numbers repeat after another number of float32 values than KITTI's.
-std::optional<OtherLayout> other_floats(const std::vector<Beginning>& files, double as_kitti) {
+std::optional<OtherLayout> other_floats(const std::vector<Beginning>& files,
+                                        const Differences& as_kitti) {
   std::optional<std::size_t> best;
-  double least = clearly_better * as_kitti;
+  double least = clearly_better;
   for (const std::size_t values : {3U, 5U, 6U, 7U}) {
     if (!fits_sizes(files, values * sizeof(float))) continue;
     // Twice six is three of KITTI's points.
     const auto found =
-        values == 6 ? difference(files, values) : difference_of_points(files, values);
-    if (!found || *found >= least) continue;
-    least = *found;
+        values == 6 ? differences(files, values) : differences_of_points(files, values);
+    if (!found) continue;
+    const double relative = relative_to_kitti(*found, as_kitti);
+    if (relative >= least) continue;
+    least = relative;
     best = values;
   }
   if (!best) return std::nullopt;
@@ -221,7 +262,7 @@ std::optional<OtherLayout> other_numbers(const std::vector<Beginning>& files) {
 BinLayout bin_layout_of(std::span<const fs::path> files) {
   const std::vector<Beginning> beginnings = beginnings_of(files);
   if (beginnings.empty()) return BinLayout::kitti;
-  const auto as_kitti = difference_of_points(beginnings, kitti_values);
+  const auto as_kitti = differences_of_points(beginnings, kitti_values);
   if (is_nuscenes(files, beginnings, as_kitti)) return BinLayout::nuscenes;
   std::optional<OtherLayout> other = other_numbers(beginnings);
   if (!other && as_kitti) other = other_floats(beginnings, *as_kitti);

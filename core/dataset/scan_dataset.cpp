@@ -227,6 +227,9 @@ std::vector<std::size_t> ScanDataset::sample() const {
 
 BinLayout ScanDataset::find_bin_layout() const {
   if (ending_of(files_.front()) != ".bin") return BinLayout::kitti;
+  // What we wrote ourselves.
+  for (const char* folder : {"rings", "time_offsets"})
+    if (!sequence_.empty() && fs::exists(sequence_ / folder)) return BinLayout::kitti;
   std::vector<fs::path> files;
   for (const std::size_t i : sample()) files.push_back(file(i));
   return bin_layout_of(files);

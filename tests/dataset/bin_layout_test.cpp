@@ -163,5 +163,36 @@ TEST_F(BinLayoutTest, TakesEveryFileOfKittisLayout) {
   EXPECT_TRUE(is_kittis(whole));
 }
 
+/// A corridor of 20 m along y by 1 m, its points in no order.
+std::vector<Measured> corridor(float brightest) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> along(-10.0F, 10.0F), across(-0.5F, 0.5F), up(-0.6F, 1.4F),
+      brightness(0.0F, 1.0F);
+  std::vector<Measured> points;
+  for (int k = 0; k < 6848; ++k) {
+    const float wall = k % 2 == 0 ? -0.5F : 0.5F;
+    const bool is_floor = k % 3 == 0;
+    points.push_back({is_floor ? across(random) : wall, along(random),
+                      is_floor ? -0.6F : up(random), brightest * brightness(random), 0.0F});
+  }
+  return points;
+}
+
+// Of a column of zeros nothing says which layout it is of, and the others are very unlike.
+TEST_F(BinLayoutTest, TakesACorridorInNoOrderWithoutIntensity) {
+  for (const float brightest : {0.0F, 255.0F}) {
+    for (const std::size_t points : {6840U, 6845U, 6846U, 6848U}) {
+      std::vector<Measured> all = corridor(brightest);
+      all.resize(points);
+      EXPECT_TRUE(is_kittis(values_of(all, 4))) << brightest << " " << points;
+    }
+  }
+  // Nearly all zeros.
+  std::vector<Measured> points = corridor(0.0F);
+  points.resize(6840);
+  for (std::size_t i = 0; i < points.size(); i += 50) points[i].intensity = 200.0F;
+  EXPECT_TRUE(is_kittis(values_of(points, 4)));
+}
+
 }  // namespace
 }  // namespace stillmap
