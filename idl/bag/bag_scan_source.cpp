@@ -198,12 +198,12 @@ Recording open_recording(const fs::path& path, const std::string& topic,
   if (is_bag(path)) {
     const auto bag = std::make_shared<const BagScanSource>(
         path, topic, label_kind.value_or(LabelKind::semantic_kitti), fields);
-    return {ScanDataset(bag, label_kind), bag->faults()};
+    return {ScanDataset(bag, label_kind), bag->faults(), bag->lost_parts()};
   }
   if (!topic.empty()) {
     throw DatasetError(path, "is no bag, and only bags have topics: leave --topic-in out");
   }
-  return {ScanDataset(path, label_kind, fields), {}};
+  return {ScanDataset(path, label_kind, fields), {}, {}};
 }
 
 ScanDataset open_sequence(const fs::path& path, const std::string& topic) {

@@ -37,6 +37,8 @@ class BagScanSource final : public ScanSource {
   /// What of the bag's files cannot be read at all, which topics are not used as there are several
   /// of an IMU or a receiver, and whether the scans are of several lidars, in words.
   [[nodiscard]] std::vector<std::string> faults() const;
+  /// Of these: files of the bag that are missing, damaged, or not read.
+  [[nodiscard]] std::vector<std::string> lost_parts() const { return bag_.faults(); }
 
  private:
   /// A damaged message says nothing.
@@ -63,6 +65,8 @@ class BagScanSource final : public ScanSource {
 struct Recording {
   ScanDataset dataset;
   std::vector<std::string> faults;
+  /// Of these: parts that are missing, damaged, or left out.
+  std::vector<std::string> lost_parts;
 };
 
 /// A recording of whatever kind: a bag, or what ScanDataset reads. `topic` is for bags alone.

@@ -194,6 +194,30 @@ void write_two_lidars(const std::filesystem::path& folder, const ScanDataset& sc
   writer.finish();
 }
 
+TEST_F(RecordTest, APartOfABagThatCannotBeReadIsReportedAndRefusedWhereStrict) {
+  simulate("city", 3);
+  const ScanDataset scans(path("city"));
+  {
+    dds::BagWriter writer(folder_ / "bag", {dds::cloud_topic("/points")});
+    for (std::size_t i = 0; i < scans.size(); ++i)
+      writer.add(0, scans.stamp_ns(i),
+                 dds::serialized(wire::to_cloud(scans.read(i).scan, {}, "lidar")));
+    writer.finish();
+  }
+  std::filesystem::remove(folder_ / "bag/metadata.yaml");
+  write("bag/second.db3", "no database");
+  const std::string map = "map " + path("bag") + " --labels none --out " + path("out");
+  const ProcessResult strict = run(map + " --strict");
+  EXPECT_EQ(strict.exit_code, 2);
+  EXPECT_THAT(strict.err, AllOf(HasSubstr("--strict"), HasSubstr("second.db3")));
+  EXPECT_FALSE(exists("out"));
+  const ProcessResult result = run(map + " --json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto faults = nlohmann::json::parse(result.out).at("recording_faults");
+  ASSERT_EQ(faults.size(), 1U);
+  EXPECT_THAT(faults[0].get<std::string>(), HasSubstr("second.db3"));
+}
+
 TEST_F(RecordTest, ARunOverOneTopicIsNotResumedOverAnother) {
   simulate("city", 13);
   write_two_lidars(folder_ / "bag", ScanDataset(path("city")));

@@ -84,8 +84,9 @@ void require_one_lidar(const std::string& config_file) {
 
 ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopSignal& stop) {
   if (!arguments.mapper.names_sensor()) require_one_lidar(arguments.mapper.config_file);
-  const ScanDataset dataset =
-      open_recording(arguments.source, arguments.recording, arguments.mapper.config_file);
+  const ScanDataset dataset = open_recording(arguments.source, arguments.recording,
+                                             arguments.mapper.config_file, arguments.range.strict)
+                                  .dataset;
   // They are copied, whatever --labels says.
   require_semantic_kitti_labels(dataset);
   std::error_code ignored;

@@ -5,17 +5,17 @@
 
 #include "clients/commands/command.hpp"
 #include "config/loaders/server_config.hpp"
-#include "idl/bag/bag_scan_source.hpp"
+#include "core/dataset/dataset_error.hpp"
 
 namespace stillmap::cli {
 namespace {
 
-ScanDataset opened(const std::string& path, const std::string& topic,
-                   std::optional<LabelKind> label_kind, const PointFieldNames& fields = {}) {
+dds::Recording opened(const std::string& path, const std::string& topic,
+                      std::optional<LabelKind> label_kind, const PointFieldNames& fields = {}) {
   dds::Recording recording = dds::open_recording(path, topic, label_kind, fields);
   for (const auto& sentences : {recording.faults, recording.dataset.remarks()})
     for (const std::string& sentence : sentences) std::cerr << "stillmap: " << sentence << "\n";
-  return std::move(recording.dataset);
+  return recording;
 }
 
 /// Nothing where nobody says classes: SemanticKITTI's are the default of the configuration.
@@ -51,22 +51,26 @@ void add_recording_options(CommandHandle command, RecordingArguments& recording)
 }
 
 ScanDataset open_recording(const std::string& path, const std::string& topic) {
-  return opened(path, topic, std::nullopt);
+  return opened(path, topic, std::nullopt).dataset;
 }
 
-ScanDataset open_recording(const std::string& path, const RecordingArguments& recording,
-                           const std::string& config_file) {
+dds::Recording open_recording(const std::string& path, const RecordingArguments& recording,
+                              const std::string& config_file, bool is_strict) {
   InputConfig input;
   if (!config_file.empty()) input = load_server_config(config_file).input;
-  ScanDataset dataset =
+  dds::Recording found =
       opened(path, recording.topic_in, label_kind_of(recording, input), input.fields);
-  const LabelCensus& census = dataset.label_census();
+  if (is_strict && !found.lost_parts.empty()) {
+    throw DatasetError(
+        path, "is not read as a whole, which --strict asks for: " + found.lost_parts.front());
+  }
+  const LabelCensus& census = found.dataset.label_census();
   if (census.unknown() > 0 && census.doubt().empty()) {
     std::cerr << "stillmap: " << census.unknown() << " of " << census.labels()
               << " labels of some scans have ids that SemanticKITTI does not have: they count as "
                  "unlabeled\n";
   }
-  return dataset;
+  return found;
 }
 
 void require_semantic_kitti_labels(const ScanDataset& dataset) {

@@ -298,7 +298,9 @@ std::optional<FrameTransform> mount_of(const ReplayArguments& arguments) {
 }
 
 ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
-  const ScanDataset dataset = open_recording(arguments.dataset, arguments.recording);
+  const ScanDataset dataset =
+      open_recording(arguments.dataset, arguments.recording, {}, arguments.replay.range.strict)
+          .dataset;
   if (arguments.replay.with_labels) warn_of_label_kind(dataset);
   (void)arguments.replay.range.end(dataset);
   if (dataset.kitti_lidar()) std::cerr << "stillmap: " << dataset.kitti_lidar()->in_words() << "\n";

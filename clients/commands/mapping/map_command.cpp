@@ -144,6 +144,7 @@ MapOutput write_map_output(const MapOutputFolder& out, const std::optional<Traje
                    .frame = body.frame,
                    .sensor = config.sensor.name,
                    .sensor_origin = {},
+                   .recording_faults = {},
                    .accuracy = std::nullopt,
                    .odometry_accuracy = std::nullopt};
   write_kitti_poses(folder / pose_file_of(body.frame), result.trajectory);
@@ -212,13 +213,6 @@ MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& 
   return map_dataset(
       dataset, arguments.range, config, body, std::move(labels), run_file, loops, earlier,
       {.scan_done = scan_done, .scan_skipped = scan_skipped, .scan_moved = scan_moved});
-}
-
-void write_report(const std::filesystem::path& file, const Json& report) {
-  std::ofstream out(file, std::ios::trunc);
-  out << report.dump(2) << "\n";
-  out.close();
-  if (!out) throw DatasetWriteError(file, "cannot be written; check the folder and the space left");
 }
 
 /// Throws std::invalid_argument for what is not FROM:TO or not of this run's scans, and where loops
@@ -370,8 +364,9 @@ ExitCode stopped_early(const MapOutputFolder& out, const std::string& what_is_th
 
 ExitCode run(const MapArguments& arguments) {
   StopSignal stop;
-  const ScanDataset dataset =
-      open_recording(arguments.dataset, arguments.recording, arguments.mapper.config_file);
+  const dds::Recording recording = open_recording(
+      arguments.dataset, arguments.recording, arguments.mapper.config_file, arguments.range.strict);
+  const ScanDataset& dataset = recording.dataset;
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
   const MappedBody body = body_of(arguments.mount, arguments.mapper.config_file);
   static_cast<void>(arguments.range.end(dataset));
@@ -402,6 +397,7 @@ ExitCode run(const MapArguments& arguments) {
   MapOutput output =
       write_map_output(out, truth, arguments.dataset, earlier.get(), result, config, body);
   output.sensor_origin = sensor_origin(arguments.mapper);
+  output.recording_faults = recording.faults;
   const Json report = to_json(result, output);
   write_report(out.unfinished() / "report.json", report);
   out.publish(result.stopped);

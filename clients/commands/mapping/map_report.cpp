@@ -2,10 +2,12 @@
 
 #include <sys/resource.h>
 
+#include <fstream>
 #include <numbers>
 #include <vector>
 
 #include "clients/terminal/table.hpp"
+#include "core/dataset/dataset_error.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -194,6 +196,8 @@ std::string pose_file_of(const std::string& frame) {
 Json to_json(const MappingResult& result, const MapOutput& output) {
   Json health = Json::object();
   for (const auto& [state, count] : result.health) health.set(name(state), count);
+  Json faults = Json::array();
+  for (const std::string& fault : output.recording_faults) faults.push_back(fault);
   const StageDurations& total = result.stages.back();
   const auto moving = looks_for_moving(result) ? result.moving : evaluation::MovingScore{};
   return {
@@ -210,6 +214,7 @@ Json to_json(const MappingResult& result, const MapOutput& output) {
       {"label_source", result.label_source},
       {"health", health},
       {"skipped", skipped_json(result.skipped)},
+      {"recording_faults", faults},
       {"tiles", result.view->tiles.size()},
       {"voxels", voxel_count(*result.view)},
       {"voxel_size_m", result.view->voxel_size_m},
@@ -223,6 +228,13 @@ Json to_json(const MappingResult& result, const MapOutput& output) {
       {"loops", result.loops ? to_json(*result.loops, output.odometry_accuracy) : Json(nullptr)},
       {"onto", result.session ? to_json(*result.session) : Json(nullptr)},
       {"folder", output.folder.string()}};
+}
+
+void write_report(const std::filesystem::path& file, const Json& report) {
+  std::ofstream out(file, std::ios::trunc);
+  out << report.dump(2) << "\n";
+  out.close();
+  if (!out) throw DatasetWriteError(file, "cannot be written; check the folder and the space left");
 }
 
 std::string describe_imu(const MappingResult& result) {

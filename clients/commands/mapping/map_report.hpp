@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/trajectory_report.hpp"
@@ -18,6 +19,8 @@ struct MapOutput {
   /// The lidar that the scans were taken for, and what said so (see sensor_origin()).
   std::string sensor;
   std::string sensor_origin;
+  /// What of the recording was not read, in words.
+  std::vector<std::string> recording_faults;
   std::optional<TrajectoryReport> accuracy;
   /// Before loops were closed.
   std::optional<TrajectoryReport> odometry_accuracy;
@@ -30,6 +33,8 @@ struct MapOutput {
 [[nodiscard]] Json to_json(const SessionReport& session);
 /// Contents of report.json.
 [[nodiscard]] Json to_json(const MappingResult& result, const MapOutput& output);
+/// Throws DatasetWriteError.
+void write_report(const std::filesystem::path& file, const Json& report);
 /// The same for people, shorter.
 [[nodiscard]] std::string describe(const MappingResult& result, const MapOutput& output);
 
