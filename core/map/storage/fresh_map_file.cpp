@@ -4,7 +4,6 @@
 #include <sqlite3.h>
 
 #include <algorithm>
-#include <array>
 #include <exception>
 #include <fstream>
 #include <functional>
@@ -17,6 +16,7 @@
 
 #include "core/map/storage/map_database.hpp"
 #include "core/map/storage/map_file.hpp"
+#include "core/map/storage/save_marks.hpp"
 
 namespace stillmap {
 namespace {
@@ -75,15 +75,8 @@ bool is_time(std::string_view text) {
                                          std::ranges::all_of(number.substr(1), is_digit)));
 }
 
-/// Whether the fault lies in the file, and not in the disk, the memory or the rights: those may be
-/// better tomorrow.
-bool is_of_content(const SQLite::Exception& fault) {
-  constexpr std::array faults{SQLITE_CORRUPT, SQLITE_NOTADB, SQLITE_ERROR, SQLITE_FORMAT};
-  return std::ranges::find(faults, fault.getErrorCode()) != faults.end();
-}
-
-/// The same of the first fault that a check of all pages tells.
-bool is_of_content(const std::string& told) {
+/// is_of_content() of the first fault that a check of all pages tells.
+bool is_told_of_content(const std::string& told) {
   constexpr std::string_view page_not_read = "error code=";
   const std::size_t begin = told.find(page_not_read);
   return begin == std::string::npos ||
@@ -102,7 +95,8 @@ LeftContent content_of_map(const fs::path& file) {
   if (fs::exists(beside(file, "-wal"), unknown)) static_cast<void>(open_map_database(file));
   SQLite::Database alone(uri_without_log(file), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
   const std::string told = alone.execAndGet("PRAGMA integrity_check(1)").getString();
-  if (told != "ok") return is_of_content(told) ? LeftContent::unfinished : LeftContent::unreadable;
+  if (told != "ok")
+    return is_told_of_content(told) ? LeftContent::unfinished : LeftContent::unreadable;
   const bool holds_map = alone
                              .execAndGet(
                                  "SELECT EXISTS (SELECT 1 FROM tiles) OR "
