@@ -29,7 +29,7 @@ struct PixelView {
   cv::Mat1b label;
 };
 
-bool is_thin(SemanticClass label) {
+bool is_drawn_on_top(SemanticClass label) {
   return label == SemanticClass::pole || label == SemanticClass::traffic_sign;
 }
 
@@ -52,9 +52,9 @@ PixelView rasterize(const MapSnapshot& view, const PictureFrame& frame) {
   for (const auto& tile : view.tiles) {
     for (const Voxel& voxel : tile->voxels) {
       const SemanticClass label = voxel.evidence.winner();
-      const float rank_m = voxel.mean_map.z() + (is_thin(label) ? 1000.0F : 0.0F);
+      const float rank_m = voxel.mean_map.z() + (is_drawn_on_top(label) ? 1000.0F : 0.0F);
       const cv::Rect cell = pixels_of(grid.corner_map(tile->info.id, voxel.index),
-                                      view.voxel_size_m, frame, is_thin(label) ? 3 : 1);
+                                      view.voxel_size_m, frame, is_drawn_on_top(label) ? 3 : 1);
       for (int y = cell.y; y < cell.y + cell.height; ++y) {
         for (int x = cell.x; x < cell.x + cell.width; ++x) {
           if (rank_m <= top.rank_m(y, x)) continue;
@@ -143,7 +143,7 @@ cv::Vec3b shade(SemanticClass label, float above_ground_m, float relief_m) {
   const cv::Vec3f colour =
       label == SemanticClass::unlabeled ? height_colour(height) : class_colour(label);
   const float edge = std::clamp(1.0F + (is_ground(label) ? 3.0F : 0.25F) * relief_m, 0.6F, 1.5F);
-  const float lift = is_ground(label) || is_thin(label) ? 1.0F : 0.7F + 0.35F * height;
+  const float lift = is_ground(label) || is_drawn_on_top(label) ? 1.0F : 0.7F + 0.35F * height;
   const cv::Vec3f lit = colour * (edge * lift);
   return {cv::saturate_cast<std::uint8_t>(lit[0]), cv::saturate_cast<std::uint8_t>(lit[1]),
           cv::saturate_cast<std::uint8_t>(lit[2])};
