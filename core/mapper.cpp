@@ -54,8 +54,9 @@ MapperConfig checked(const MapperConfig& config) {
   return config;
 }
 
-/// Robots stand on slopes that are less steep.
-constexpr double max_doubtless_tilt_rad = std::numbers::pi / 3.0;
+/// Robots stand on slopes that are less steep; a lidar alone may lie on its side.
+constexpr double max_tilt_of_robot_rad = std::numbers::pi / 3.0;
+constexpr double max_doubtless_tilt_rad = 2.0 * std::numbers::pi / 3.0;
 
 double tilt_of(const Eigen::Vector3d& up) { return std::acos(std::clamp(up.z(), -1.0, 1.0)); }
 
@@ -251,7 +252,7 @@ std::optional<Eigen::Isometry3d> Mapper::levelled(
 std::string Mapper::fault_of_up(const Eigen::Vector3d& up_lidar, const Scan& scan) const {
   const Eigen::Vector3d up =
       T_base_lidar_ ? Eigen::Vector3d(T_base_lidar_->linear() * up_lidar) : up_lidar;
-  if (tilt_of(up) <= max_doubtless_tilt_rad) return "";
+  if (tilt_of(up) <= (T_base_lidar_ ? max_tilt_of_robot_rad : max_doubtless_tilt_rad)) return "";
   // A robot does not begin on its side. A lidar alone may hang from anything, above what it sees.
   if (!T_base_lidar_ && !has_floor_above(scan, up_lidar)) return "";
   return "by it the " + std::string(T_base_lidar_ ? "robot" : "lidar") + " leans by " +

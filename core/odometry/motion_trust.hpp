@@ -9,8 +9,9 @@ namespace stillmap {
 
 /// Decides whether the motion of the lidar that another odometry (wheels) foretells is believed: as
 /// long as it foretells what is then registered at least about as well as the last motion,
-/// repeated, does. A single motion that no robot can make is none, as that of an odometry that sets
-/// itself elsewhere. NOT thread safe.
+/// repeated, does; and again where nothing was registered for some time that could tell. A single
+/// motion that no robot can make is none, as that of an odometry that sets itself elsewhere. NOT
+/// thread safe.
 class MotionTrust {
  public:
   explicit MotionTrust(const MotionLimits& limits) : limits_(limits) {}
@@ -39,6 +40,8 @@ class MotionTrust {
   std::optional<Motion> last_foretold_;
   std::optional<Eigen::Isometry3d> foretold_;
   bool is_believed_ = true;
+  /// Motions in a row that were foretold and nobody learned of.
+  int untold_ = 0;
   /// Means of squares over the last scans, in what is borne.
   double missed_ = 0.0;
   double missed_by_repetition_ = 0.0;

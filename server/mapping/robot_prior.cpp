@@ -44,6 +44,7 @@ std::optional<Eigen::Isometry3d> RobotPrior::lidar_motion(std::int64_t from_ns,
                                          std::to_string(interval_s) + " s");
       return std::nullopt;
     }
+    tell_of_trust();
     if (!trust_.is_believed()) return std::nullopt;
     return foretold;
   }
@@ -57,12 +58,15 @@ std::optional<Eigen::Isometry3d> RobotPrior::lidar_motion(std::int64_t from_ns,
 void RobotPrior::learn(const Trajectory& before, std::int64_t stamp_ns,
                        const OdometryResult& odometry) {
   if (odometry.health != OdometryHealth::good || before.empty()) return;
-  const bool was_believed = trust_.is_believed();
   trust_.learn(before.back().T_map_lidar.inverse() * odometry.T_map_lidar,
                1e-9 * static_cast<double>(stamp_ns - before.back().stamp_ns));
-  if (trust_.is_believed() == was_believed) return;
+  tell_of_trust();
+}
+
+void RobotPrior::tell_of_trust() {
+  if (std::exchange(was_believed_, trust_.is_believed()) == trust_.is_believed()) return;
   constexpr const char* kind = "odometry prior's motion";
-  if (trust_.is_believed()) return statistics_.set_input_fault(kind, "");
+  if (was_believed_) return statistics_.set_input_fault(kind, "");
   const std::string why =
       "it does not foretell how the lidar then moves: an encoder that fails, wheels that slip, or "
       "another robot's";
@@ -84,10 +88,15 @@ std::optional<OdomPose> RobotPrior::pose_in_odom(std::int64_t stamp_ns,
     if (prior) break;
   }
   const auto T_lidar_frame = prior ? frames_.T_lidar_frame(prior->frame) : std::nullopt;
+  std::string why_not = "no pose of the odometry prior is of the time of a scan";
   if (prior && prior->odom_frame != odom_frame_) {
-    refuse("odometry_prior_unknown_frame",
-           "its poses are in the frame '" + shown_name(prior->odom_frame) +
-               "' (header.frame_id), and frames.odom is '" + odom_frame_ + "'");
+    const std::string unfit = "its poses are in the frame '" + shown_name(prior->odom_frame) +
+                              "' (header.frame_id), and frames.odom is '" + odom_frame_ + "'";
+    refuse("odometry_prior_unknown_frame", unfit);
+    why_not = "the odometry prior cannot be used: " + unfit;
+  } else if (prior && !T_lidar_frame) {
+    why_not = "where the odometry prior's frame '" + shown_name(prior->frame) +
+              "' (child_frame_id) is on the robot is not known";
   } else if (T_lidar_frame) {
     const Eigen::Isometry3d T_base_frame = frames_.T_base_lidar() * *T_lidar_frame;
     T_map_odom_ = pose->T_map_base * T_base_frame * prior->T_odom_frame.inverse();
@@ -97,10 +106,8 @@ std::optional<OdomPose> RobotPrior::pose_in_odom(std::int64_t stamp_ns,
   constexpr const char* kind = "odom";
   if (!T_map_odom_) {
     if (++unknown_scans_ == silent_scans) {
-      statistics_.set_input_fault(
-          kind, "map -> " + odom_frame_ +
-                    " is not published: no pose of the odometry prior is of the time of a scan "
-                    "(frames.odom_source: prior)");
+      statistics_.set_input_fault(kind, "map -> " + odom_frame_ + " is not published: " + why_not +
+                                            " (frames.odom_source: prior)");
     }
     return std::nullopt;
   }

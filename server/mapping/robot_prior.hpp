@@ -44,6 +44,7 @@ class RobotPrior {
   /// Poses are from now on in another map, or elsewhere in it.
   void forget_poses() {
     poses_.clear();
+    T_map_odom_.reset();
     trust_.forget_motion();
   }
 
@@ -51,9 +52,12 @@ class RobotPrior {
   /// Whether it said something of this time.
   void report(bool has_said, std::int64_t stamp_ns);
   void refuse(const std::string& counter, const std::string& reason);
+  /// Where trust was lost or regained.
+  void tell_of_trust();
 
   const OdometryPrior* prior_;
   MotionTrust trust_;
+  bool was_believed_ = true;
   const RobotFrames& frames_;
   std::string odom_frame_;
   Statistics& statistics_;

@@ -52,6 +52,29 @@ TEST_F(MotionTrusts, AJumpIsNoMotionAndCostsNoTrust) {
   EXPECT_EQ(drive(20, 1.0, 1.0), 20);
 }
 
+TEST_F(MotionTrusts, OneMissOfAGoodPriorCostsNoTrust) {
+  drive(20, 0.5, 0.5);
+  drive(1, 0.8, 0.5);
+  EXPECT_TRUE(trust_.is_believed());
+}
+
+// In a tunnel nothing is registered that could tell, and wheels are all there is.
+TEST_F(MotionTrusts, TrustComesBackWhereNothingTells) {
+  drive(20, 0.5, 0.5);
+  drive(10, 0.5, 0.0);
+  ASSERT_FALSE(trust_.is_believed());
+  for (int i = 0; i < 25; ++i) static_cast<void>(trust_.is_possible(ahead(0.5), interval_s));
+  EXPECT_TRUE(trust_.is_believed());
+}
+
+TEST_F(MotionTrusts, WhatIsBorneGrowsWithTheTimeBetweenScans) {
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_TRUE(trust_.is_possible(ahead(5.15), 0.5));
+    trust_.learn(ahead(5.0), 0.5);
+  }
+  EXPECT_TRUE(trust_.is_believed());
+}
+
 // A robot that is pushed while it is not registered.
 TEST_F(MotionTrusts, WhatGoesOnIsNoJump) {
   drive(20, 0.1, 0.1);
