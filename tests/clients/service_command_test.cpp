@@ -126,9 +126,10 @@ TEST_F(ServiceCommandTest, ARobotWithoutAPoseIsNoMissingServer) {
   ASSERT_EQ(run("status" + patiently() + on_domain()).exit_code, 0) << content("server.log");
   for (const char* command :
        {"query --around-robot 30", "traversable --around-robot 30", "plan --to 5,0"}) {
-    const ProcessResult result = run(command + patiently() + on_domain());
+    const ProcessResult result = run(command + std::string(" --timeout 5") + on_domain());
     EXPECT_EQ(result.exit_code, 1) << command;
     EXPECT_THAT(result.err, HasSubstr("no pose yet")) << command;
+    EXPECT_THAT(result.err, HasSubstr("no scan received")) << command;
   }
 }
 

@@ -3,18 +3,11 @@
 #include <condition_variable>
 #include <mutex>
 #include <stdexcept>
+#include <string>
 
 namespace stillmap::cli {
-namespace {
-
-constexpr const char* no_pose = "the server has no pose yet: it has mapped no scan";
-
-}  // namespace
 
 Trajectory fetch_trajectory(Client& client, std::chrono::milliseconds timeout) {
-  const dds::ServerStatus status = client.status();
-  if (status.map_version == 0 && status.counter("scans_mapped") == 0)
-    throw std::runtime_error(no_pose + (status.reason.empty() ? "" : ": " + status.reason));
   std::mutex mutex;
   std::condition_variable arrived;
   Trajectory newest;
@@ -26,7 +19,10 @@ Trajectory fetch_trajectory(Client& client, std::chrono::milliseconds timeout) {
   });
   std::unique_lock lock(mutex);
   if (!arrived.wait_for(lock, timeout, [&] { return !newest.empty(); })) {
-    throw std::runtime_error(no_pose);
+    lock.unlock();
+    const std::string reason = client.status().reason;
+    throw std::runtime_error("the server has no pose yet: it has mapped no scan" +
+                             (reason.empty() ? "" : ": " + reason));
   }
   return newest;
 }

@@ -6,8 +6,8 @@
 
 namespace stillmap::cli {
 
-/// The poses since the server's map began. Throws std::runtime_error when there are none: at once
-/// where the server has mapped nothing, else after `timeout`; ServiceTimeout without a server.
+/// The poses since the server's map began. Throws std::runtime_error with what the server
+/// waits for when there are none after `timeout`; ServiceTimeout without a server.
 [[nodiscard]] Trajectory fetch_trajectory(Client& client, std::chrono::milliseconds timeout);
 
 }  // namespace stillmap::cli
