@@ -32,6 +32,14 @@ class OdometryPriorFrames : public Frames {
   /// The first scans may be mapped before the server has read a pose of the wheels.
   static constexpr std::chrono::seconds few_patience{3};
 
+  using Tf = dds::Reader<tf2_msgs::msg::TFMessage>;
+
+  void start_with_own_odom() {
+    start("frames: {base: base_link, odom: wheel_odom, odom_source: prior}\n" +
+          std::string(turned_mount_yaml));
+  }
+  static std::string wheels_topic() { return dds::odometry_prior_topic("odom_prior").dds_name; }
+
   /// Wheels that say that the robot goes as in the room, and then ahead and round a curve.
   static Eigen::Isometry3d T_wheels_base(int index) {
     if (index < seen_scans) return T_room_base(index);
@@ -45,8 +53,7 @@ class OdometryPriorFrames : public Frames {
       int scans, const std::string& child_frame,
       const Eigen::Isometry3d& T_wheels_after_reset = Eigen::Isometry3d::Identity(),
       int poses = seen_scans + 2, const std::string& odom_frame = "wheel_odom") {
-    const auto topic = dds::odometry_prior_topic("odom_prior");
-    dds::Writer<nav_msgs::msg::Odometry> wheels(*participant_, topic.dds_name, {.depth = 100});
+    dds::Writer<nav_msgs::msg::Odometry> wheels(*participant_, wheels_topic(), {.depth = 100});
     ASSERT_TRUE(wheels.readers().wait_for_any(patience));
     // Once: what came earlier and comes again looks like a clock that was set back.
     for (int i = 0; i < poses; ++i) {
@@ -79,9 +86,8 @@ TEST_F(OdometryPriorFrames, MotionOfTheBasePredictsTheLidars) {
 }
 
 TEST_F(OdometryPriorFrames, WheelsThatHaveTheirOwnOdomGetOnlyItsPlaceInTheMap) {
-  start("frames: {base: base_link, odom: wheel_odom, odom_source: prior}\n" +
-        std::string(turned_mount_yaml));
-  dds::Reader<tf2_msgs::msg::TFMessage> tf(*participant_, topics_.tf.dds_name, topics_.tf.reader);
+  start_with_own_odom();
+  Tf tf(*participant_, topics_.tf.dds_name, topics_.tf.reader);
   ASSERT_TRUE(tf.events().wait_for_writer(patience));
   drive_with_wheels(seen_scans, "base_link");
   std::vector<FrameTransform> last;
@@ -102,12 +108,10 @@ TEST_F(OdometryPriorFrames, WheelsThatHaveTheirOwnOdomGetOnlyItsPlaceInTheMap) {
 }
 
 TEST_F(OdometryPriorFrames, WheelsThatAreLateStillTellWhereTheirOdomIs) {
-  start("frames: {base: base_link, odom: wheel_odom, odom_source: prior}\n" +
-        std::string(turned_mount_yaml));
-  dds::Reader<tf2_msgs::msg::TFMessage> tf(*participant_, topics_.tf.dds_name, topics_.tf.reader);
+  start_with_own_odom();
+  Tf tf(*participant_, topics_.tf.dds_name, topics_.tf.reader);
   ASSERT_TRUE(tf.events().wait_for_writer(patience));
-  const auto topic = dds::odometry_prior_topic("odom_prior");
-  dds::Writer<nav_msgs::msg::Odometry> wheels(*participant_, topic.dds_name, {.depth = 100});
+  dds::Writer<nav_msgs::msg::Odometry> wheels(*participant_, wheels_topic(), {.depth = 100});
   ASSERT_TRUE(wheels.readers().wait_for_any(patience));
   constexpr int late_scans = 3;
   const Eigen::Isometry3d T_start = from_xyz_rpy({100.0, 50.0, 0.0}, {0.0, 0.0, 1.0});
@@ -139,12 +143,10 @@ TEST_F(OdometryPriorFrames, WheelsThatAreLateStillTellWhereTheirOdomIs) {
 }
 
 TEST_F(OdometryPriorFrames, WheelsWithoutAnOrientationAreNamed) {
-  start("frames: {base: base_link, odom: wheel_odom, odom_source: prior}\n" +
-        std::string(turned_mount_yaml));
-  dds::Reader<tf2_msgs::msg::TFMessage> tf(*participant_, topics_.tf.dds_name, topics_.tf.reader);
+  start_with_own_odom();
+  Tf tf(*participant_, topics_.tf.dds_name, topics_.tf.reader);
   ASSERT_TRUE(tf.events().wait_for_writer(patience));
-  const auto topic = dds::odometry_prior_topic("odom_prior");
-  dds::Writer<nav_msgs::msg::Odometry> wheels(*participant_, topic.dds_name, {.depth = 100});
+  dds::Writer<nav_msgs::msg::Odometry> wheels(*participant_, wheels_topic(), {.depth = 100});
   ASSERT_TRUE(wheels.readers().wait_for_any(patience));
   for (int i = 0; i < seen_scans; ++i) {
     const auto none = Eigen::Matrix<double, 6, 6>::Zero();
@@ -181,9 +183,8 @@ TEST_F(OdometryPriorFrames, AFrameThatIsNowhereOnTheRobotIsRefused) {
 }
 
 TEST_F(OdometryPriorFrames, TheirOwnOdomStaysWhereItIsWhileTheNextPoseIsOnItsWay) {
-  start("frames: {base: base_link, odom: wheel_odom, odom_source: prior}\n" +
-        std::string(turned_mount_yaml));
-  dds::Reader<tf2_msgs::msg::TFMessage> tf(*participant_, topics_.tf.dds_name, topics_.tf.reader);
+  start_with_own_odom();
+  Tf tf(*participant_, topics_.tf.dds_name, topics_.tf.reader);
   ASSERT_TRUE(tf.events().wait_for_writer(patience));
   // The newest pose is of the last scan but one; frames are named as drivers of old did.
   drive_with_wheels(seen_scans, "/base_link", Eigen::Isometry3d::Identity(), seen_scans - 1,
