@@ -34,9 +34,11 @@ double square_of(const Eigen::Isometry3d& missed, double interval_s) {
 
 bool MotionTrust::is_reachable(const Motion& last, const Eigen::Isometry3d& motion,
                                double interval_s) const {
-  const double between_middles_s = 0.5 * (interval_s + last.interval_s);
-  const Eigen::Vector3d expected_m =
-      last.T_before_after.translation() * (interval_s / last.interval_s);
+  // Of a moment, the noise of two poses is no velocity.
+  constexpr double min_share = 0.25;
+  const double last_s = std::max(last.interval_s, min_share * interval_s);
+  const double between_middles_s = 0.5 * (interval_s + last_s);
+  const Eigen::Vector3d expected_m = last.T_before_after.translation() * (interval_s / last_s);
   return (motion.translation() - expected_m).norm() <=
          limits_.max_acceleration_m_s2 * between_middles_s * interval_s + noise_m;
 }

@@ -75,6 +75,14 @@ TEST_F(MotionTrusts, WhatIsBorneGrowsWithTheTimeBetweenScans) {
   EXPECT_TRUE(trust_.is_believed());
 }
 
+// Two stamps of one moment: 1 cm of noise would be 10 m/s.
+TEST_F(MotionTrusts, NoiseBetweenTwoStampsIsNoVelocity) {
+  drive(20, 0.1, 0.1);
+  static_cast<void>(trust_.is_possible(ahead(0.01), 0.001));
+  trust_.learn(ahead(0.01), 0.001);
+  EXPECT_TRUE(trust_.is_possible(ahead(0.1), interval_s));
+}
+
 // A robot that is pushed while it is not registered.
 TEST_F(MotionTrusts, WhatGoesOnIsNoJump) {
   drive(20, 0.1, 0.1);
