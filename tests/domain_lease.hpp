@@ -5,12 +5,11 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <optional>
 #include <random>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -31,7 +30,6 @@ class DomainLease {
     for (int attempt = 0; attempt < 1000; ++attempt) {
       const int domain = std::uniform_int_distribution(first_domain, last_domain)(random);
       if (auto lease = try_to_take(domain)) return std::move(*lease);
-      // For a second or so `stillmap doctor` listens to all domains at once.
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     throw std::runtime_error("no free DDS domain");
@@ -56,20 +54,26 @@ class DomainLease {
         ("stillmap-test-domain-" + std::to_string(domain) + "-of-" + std::to_string(::getuid()));
     DomainLease lease(domain, ::open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
     // Somebody else's process may still use it without a lease.
-    if (lease.file_ < 0 || ::flock(lease.file_, LOCK_EX | LOCK_NB) != 0 ||
-        is_used(7400 + 250 * domain)) {
+    if (lease.file_ < 0 || ::flock(lease.file_, LOCK_EX | LOCK_NB) != 0 || is_used(domain)) {
       return std::nullopt;
     }
     return lease;
   }
 
-  /// Whether some socket of this machine has the UDP port, as /proc/net/udp lists them.
-  static bool is_used(int port) {
-    std::ostringstream end_of_address;
-    end_of_address << ":" << std::hex << std::uppercase << port << " ";
+  /// Whether some socket of this machine has the domain's discovery port (RTPS 9.6.1), as
+  /// /proc/net/udp lists them. One that is bound to the multicast group alone is no participant's,
+  /// but that of `stillmap doctor`, which listens to all domains at once.
+  static bool is_used(int domain) {
+    const unsigned discovery_port = 7400U + 250U * static_cast<unsigned>(domain);
+    constexpr unsigned group = 0x0100FFEF;  // 239.255.0.1
     std::ifstream stream("/proc/net/udp");
-    const std::string sockets{std::istreambuf_iterator<char>(stream), {}};
-    return sockets.find(end_of_address.str()) != std::string::npos;
+    for (std::string line; std::getline(stream, line);) {
+      unsigned address = 0;
+      unsigned port = 0;
+      if (std::sscanf(line.c_str(), " %*d: %x:%x", &address, &port) != 2) continue;
+      if (port == discovery_port && address != group) return true;
+    }
+    return false;
   }
 
   int domain_;

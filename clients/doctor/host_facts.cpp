@@ -71,7 +71,9 @@ bool takes_multicast(const fs::path& route_file) {
   return false;
 }
 
-// Lines of /proc/net/udp: number, address:port in hexadecimal, and more.
+// Lines of /proc/net/udp: number, address:port in hexadecimal, and more. Participants have their
+// port on an address of their own, too, or on all; on 239.255.0.1 alone is a doctor, which listens
+// to all domains at once: another one would look for servers where it is.
 std::vector<std::uint16_t> ports_in(const fs::path& udp_file) {
   std::vector<std::uint16_t> ports;
   std::ifstream in(udp_file);
@@ -82,7 +84,7 @@ std::vector<std::uint16_t> ports_in(const fs::path& udp_file) {
     std::string number, local;
     words >> number >> local;
     const std::size_t colon = local.find(':');
-    if (colon == std::string::npos) continue;
+    if (colon == std::string::npos || local.starts_with("0100FFEF:")) continue;
     ports.push_back(static_cast<std::uint16_t>(std::stoul(local.substr(colon + 1), nullptr, 16)));
   }
   return ports;

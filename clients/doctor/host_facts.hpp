@@ -29,7 +29,7 @@ struct HostFacts {
   std::vector<NetworkInterface> interfaces;
   /// Some route takes multicast packets.
   bool has_multicast_route = false;
-  /// Local UDP ports in use.
+  /// Local UDP ports in use, but those of a doctor that listens to all domains meanwhile.
   std::vector<std::uint16_t> udp_ports;
 };
 

@@ -33,7 +33,8 @@ class HostFactsTest : public testing::Test {
           "  sl  local_address rem_address   st\n"
           "   1: 00000000:1CE8 00000000:0000 07\n"    // 7400: domain 0
           "   2: 00000000:23F0 00000000:0000 07\n"    // 9200: no discovery port
-          "   3: 0100007F:4F4C 00000000:0000 07\n");  // 20300: none either
+          "   3: 0100007F:4F4C 00000000:0000 07\n"    // 20300: none either
+          "   4: 0100FFEF:1EDC 00000000:0000 07\n");  // 7900: a doctor listens
   }
 
   void write(const std::string& name, const std::string& text) const {
