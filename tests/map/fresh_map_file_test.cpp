@@ -15,6 +15,7 @@
 #include "core/map/storage/map_file.hpp"
 #include "core/map/storage/map_lock.hpp"
 #include "tests/map/saved_maps.hpp"
+#include "tests/map/short_lock_patience.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {
@@ -137,6 +138,7 @@ TEST_F(FreshMapFileTest, WhatCannotBeReadNowStays) {
 }
 
 TEST_F(FreshMapFileTest, WhatAnotherProgramHasLockedStays) {
+  const test::ShortLockPatience patience;
   const FreshMapFile fresh(file_);
   open_map_file(fresh.path())->save(test::saved_map(1));
   SQLite::Database other(fresh.path().string(), SQLite::OPEN_READWRITE);

@@ -14,6 +14,7 @@
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/map/storage/map_sessions.hpp"
 #include "tests/map/saved_maps.hpp"
+#include "tests/map/short_lock_patience.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {
@@ -38,6 +39,7 @@ class MapFileLogTest : public testing::Test {
     ASSERT_GT(fs::file_size(log_), 32U);
   }
 
+  test::ShortLockPatience patience_;
   ScratchFolder folder_;
   fs::path file_ = folder_ / "city.stillmap";
   fs::path log_ = folder_ / "city.stillmap-wal";
@@ -180,6 +182,7 @@ TEST(MapFileFates, APipeUnderItsNameIsNotWaitedFor) {
 }
 
 TEST(MapFileFates, AReaderOfTilesThatClosesLastDoesNotBringAnAbandonedLogIn) {
+  const test::ShortLockPatience patience;
   for (const bool is_abandoned : {true, false}) {
     const ScratchFolder folder;
     const fs::path file = folder / "map.stillmap", backup = folder / "backup.stillmap";

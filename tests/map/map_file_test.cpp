@@ -9,6 +9,7 @@
 #include <random>
 
 #include "tests/map/saved_maps.hpp"
+#include "tests/map/short_lock_patience.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {
@@ -190,6 +191,7 @@ TEST_F(MapFileTest, RefusesAFolderAndAMissingFolder) {
 
 /// A server is started again for it.
 TEST_F(MapFileTest, WhatAnotherTryMayMendIsNotUnusable) {
+  const test::ShortLockPatience patience;
   open_map_file(file_)->save(saved_map(1));
   SQLite::Database other(file_.string(), SQLite::OPEN_READWRITE);
   other.exec("PRAGMA locking_mode = EXCLUSIVE");

@@ -15,6 +15,7 @@
 #include "core/map/storage/map_file.hpp"
 #include "server/mapping/map_saver.hpp"
 #include "server/monitoring/metrics.hpp"
+#include "tests/map/short_lock_patience.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap::server {
@@ -125,6 +126,7 @@ class DisplacedMapFile : public testing::Test, public CheckpointSource {
     return status.counter("map_files_displaced");
   }
 
+  test::ShortLockPatience patience_;
   ScratchFolder folder_;
   std::filesystem::path file_ = folder_ / "city.stillmap";
   StaticMap map_{StaticMapConfig()};

@@ -12,6 +12,7 @@
 #include "core/map/map_id.hpp"
 #include "core/map/static_map.hpp"
 #include "server/mapping/map_saver.hpp"
+#include "tests/map/short_lock_patience.hpp"
 #include "tests/scratch_folder.hpp"
 #include "tests/server/latest_map_source.hpp"
 
@@ -93,6 +94,7 @@ class MapSaverSafetyTest : public testing::Test {
 };
 
 TEST_F(MapSaverSafetyTest, ALoadThatCannotBeWrittenChangesNothing) {
+  const test::ShortLockPatience patience;
   MapSaver saver = this->saver();
   saver.set_source(source_);
   map_scan(5.0F);
