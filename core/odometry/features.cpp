@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 #include <tsl/robin_map.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -157,21 +158,35 @@ std::vector<std::uint32_t> few_surfaces(const Scan& scan, const FeatureConfig& c
 
 namespace {
 
+/// Lidars that lean less than this are taken to stand upright: a slope of this much is level
+/// ground, too [rad].
+constexpr float max_lean_rad = 0.17F;
+
+/// Turns what a lidar on its side sees upright.
+Eigen::Matrix3f upright_rotation(const Eigen::Vector3f& up_lidar) {
+  if (up_lidar.z() > std::cos(max_lean_rad)) return Eigen::Matrix3f::Identity();
+  return Eigen::Quaternionf::FromTwoVectors(up_lidar, Eigen::Vector3f::UnitZ()).toRotationMatrix();
+}
+
 /// Where every column of the scan has points, in slices of its height.
 class ColumnHeights {
  public:
-  ColumnHeights(std::span<const Eigen::Vector3f> points, std::span<const std::uint32_t> chosen) {
+  ColumnHeights(std::span<const Eigen::Vector3f> points, std::span<const std::uint32_t> chosen,
+                const Eigen::Vector3f& up_lidar)
+      : R_upright_lidar_(upright_rotation(up_lidar)) {
     slices_.reserve(chosen.size());
     for (const std::uint32_t i : chosen) {
-      const float z = points[i].z();
-      const auto [entry, is_new] = slices_.try_emplace(key_of(points[i], slice_of(z)), Range{z, z});
+      const Eigen::Vector3f point = R_upright_lidar_ * points[i];
+      const float z = point.z();
+      const auto [entry, is_new] = slices_.try_emplace(key_of(point, slice_of(z)), Range{z, z});
       if (is_new) continue;
       entry.value().low = std::min(entry->second.low, z);
       entry.value().high = std::max(entry->second.high, z);
     }
   }
   /// What the point lies on is higher than level ground. A ceiling above a floor is not.
-  [[nodiscard]] bool stands_up(const Eigen::Vector3f& point) const {
+  [[nodiscard]] bool stands_up(const Eigen::Vector3f& point_lidar) const {
+    const Eigen::Vector3f point = R_upright_lidar_ * point_lidar;
     constexpr float min_height_m = 0.6F;
     // So far above and below the next rings of a sparse lidar meet a wall.
     constexpr float min_reach_m = 1.25F;
@@ -203,6 +218,7 @@ class ColumnHeights {
     return packed_index(static_cast<int>(std::floor(point.x())),
                         static_cast<int>(std::floor(point.y())), slice);
   }
+  Eigen::Matrix3f R_upright_lidar_;
   tsl::robin_map<std::uint64_t, Range, IndexHash> slices_;
 };
 
@@ -218,12 +234,13 @@ std::vector<std::uint32_t> some_of(const std::vector<std::uint32_t>& all, std::s
 constexpr double map_point_spacing_m = 0.5;
 
 /// Points of any kind for the alignment of points, from those of the map's spacing.
-void pick_points(const Scan& scan, std::vector<std::uint32_t> spaced, Features& features) {
+void pick_points(const Scan& scan, std::vector<std::uint32_t> spaced,
+                 const Eigen::Vector3f& up_lidar, Features& features) {
   constexpr double spacing_m = 1.0;
   constexpr std::size_t max_upright = 800;
   constexpr std::size_t max_level = 300;
   features.points = std::move(spaced);
-  const ColumnHeights columns(scan.points_lidar, features.points);
+  const ColumnHeights columns(scan.points_lidar, features.points, up_lidar);
   std::vector<std::uint32_t> upright, level;
   for (const std::uint32_t i : voxel_downsample(scan.points_lidar, features.points, spacing_m))
     (columns.stands_up(scan.points_lidar[i]) ? upright : level).push_back(i);
@@ -245,14 +262,15 @@ bool has_sparse_rings(const SensorModel& sensor) {
          sensor.fov_up - sensor.fov_down >= min_spacing_rad * sensor.rings;
 }
 
-Features extract_surfaces(const Scan& scan, const FeatureConfig& config) {
+Features extract_surfaces(const Scan& scan, const FeatureConfig& config,
+                          const Eigen::Vector3f& up_lidar) {
   std::vector<std::uint32_t> all(scan.size());
   std::iota(all.begin(), all.end(), 0U);
   Features features;
   features.planes = voxel_downsample(scan.points_lidar, all, config.map_surface_spacing_m);
   features.surfaces =
       voxel_downsample(scan.points_lidar, features.planes, config.surface_spacing_m);
-  const ColumnHeights columns(scan.points_lidar, features.planes);
+  const ColumnHeights columns(scan.points_lidar, features.planes, up_lidar);
   features.is_level.resize(scan.size());
   for (const std::uint32_t i : features.surfaces)
     features.is_level[i] = !columns.stands_up(scan.points_lidar[i]);
@@ -261,11 +279,12 @@ Features extract_surfaces(const Scan& scan, const FeatureConfig& config) {
               are_points_spaced
                   ? features.surfaces
                   : voxel_downsample(scan.points_lidar, features.planes, map_point_spacing_m),
-              features);
+              up_lidar, features);
   return features;
 }
 
-Features extract_features(const Scan& scan, const FeatureConfig& config) {
+Features extract_features(const Scan& scan, const FeatureConfig& config,
+                          const Eigen::Vector3f& up_lidar) {
   assert(scan.ring.size() == scan.size());
   RingOrder rings(scan);
   std::vector<RingFeatures> of_ring(rings.count());
@@ -285,7 +304,8 @@ Features extract_features(const Scan& scan, const FeatureConfig& config) {
       voxel_downsample(scan.points_lidar, features.planes, config.plane_spacing_m);
   std::vector<std::uint32_t> all(scan.size());
   std::iota(all.begin(), all.end(), 0U);
-  pick_points(scan, voxel_downsample(scan.points_lidar, all, map_point_spacing_m), features);
+  pick_points(scan, voxel_downsample(scan.points_lidar, all, map_point_spacing_m), up_lidar,
+              features);
   return features;
 }
 

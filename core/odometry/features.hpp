@@ -42,8 +42,10 @@ struct Features {
 /// Whether a lidar's rings are so far apart that the nearest points of one mostly are its own.
 [[nodiscard]] bool has_sparse_rings(const SensorModel& sensor);
 
-/// All points of a scan without rings, thinned: `planes` and `surfaces`.
-[[nodiscard]] Features extract_surfaces(const Scan& scan, const FeatureConfig& config);
+/// All points of a scan without rings, thinned: `planes` and `surfaces`. What stands up and what is
+/// level ground is told along `up_lidar`, a unit vector: a lidar may hang on its side.
+[[nodiscard]] Features extract_surfaces(const Scan& scan, const FeatureConfig& config,
+                                        const Eigen::Vector3f& up_lidar = Eigen::Vector3f::UnitZ());
 
 /// About `config.max_surfaces` of the `surfaces`, spread evenly.
 [[nodiscard]] std::vector<std::uint32_t> few_surfaces(const Scan& scan, const FeatureConfig& config,
@@ -51,7 +53,9 @@ struct Features {
 
 /// Edge and plane points of every ring by their curvature (LOAM V-A, with
 /// the rejection of occluded and grazing points that A-LOAM dropped). `scan.ring` must be known.
-[[nodiscard]] Features extract_features(const Scan& scan, const FeatureConfig& config);
+/// `up_lidar` as for extract_surfaces().
+[[nodiscard]] Features extract_features(const Scan& scan, const FeatureConfig& config,
+                                        const Eigen::Vector3f& up_lidar = Eigen::Vector3f::UnitZ());
 
 /// Curvature of each point of the ring,
 /// NaN where the ring has too few neighbours or jumps in depth.

@@ -24,6 +24,11 @@ constexpr double reclassify_angle_rad = 0.01;
 /// from one 2 m away, at a fifth of a degree each.
 constexpr std::size_t steps_on_near_walls = 40;
 
+/// The map's z, along the lidar's axes.
+Eigen::Vector3f up_along_lidar(const Eigen::Isometry3d& T_map_lidar) {
+  return T_map_lidar.linear().row(2).transpose().cast<float>();
+}
+
 }  // namespace
 
 bool Odometry::State::has_velocity(std::int64_t stamp_ns) const {
@@ -105,9 +110,10 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
 
 void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& prediction) const {
   parts.sparse_rings = is_by_surfaces && (has_sparse_rings(sensor) || is_map_young());
+  const Eigen::Vector3f up_lidar = up_along_lidar(prediction.T_map_lidar);
   const auto find_features = [&] {
-    parts.features = is_by_surfaces ? extract_surfaces(parts.scan, config.features)
-                                    : extract_features(parts.scan, config.features);
+    parts.features = is_by_surfaces ? extract_surfaces(parts.scan, config.features, up_lidar)
+                                    : extract_features(parts.scan, config.features, up_lidar);
     if (!fits.are_known() && !parts.scan.ring.empty())
       parts.features.point_tangents =
           ring_tangents(parts.scan, parts.features.upright_points, steps_on_near_walls);
@@ -293,7 +299,8 @@ void Odometry::State::go_on_by_surfaces(const ScanInParts& parts, const Step& st
   ScanInParts again{.scan = parts.scan,
                     .sweep = parts.sweep,
                     .labels = parts.labels,
-                    .features = extract_surfaces(parts.scan, config.features),
+                    .features = extract_surfaces(parts.scan, config.features,
+                                                 up_along_lidar(step.T_map_lidar_middle)),
                     .objects = parts.objects,
                     .motion_classes = parts.motion_classes,
                     .sparse_rings = has_sparse_rings(sensor)};

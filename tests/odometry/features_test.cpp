@@ -3,9 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <numeric>
 #include <random>
 #include <set>
@@ -225,6 +227,29 @@ TEST(ExtractSurfaces, TellsLevelGroundFromWhatStandsUp) {
   }
   EXPECT_GT(level, 50U);
   EXPECT_GT(upright, 50U);
+}
+
+TEST(ExtractSurfaces, TellsLevelGroundWhereTheLidarLiesOnItsSide) {
+  const Eigen::Matrix3f R_level_lidar =
+      Eigen::AngleAxisf(0.5F * std::numbers::pi_v<float>, Eigen::Vector3f::UnitX())
+          .toRotationMatrix();
+  Scan scan;
+  std::vector<bool> is_wall;
+  const auto see = [&](float x, float y, float z) {
+    scan.points_lidar.push_back(R_level_lidar.transpose() * Eigen::Vector3f(x, y, z));
+    is_wall.push_back(y > 9.2F);
+  };
+  for (float x = -9.0F; x < 9.0F; x += 0.1F) {
+    for (float y = -9.0F; y < 9.0F; y += 0.1F) see(x, y, -1.7F);
+    for (float z = -1.7F; z < 2.0F; z += 0.1F) see(x, 9.5F, z);
+  }
+  const Eigen::Vector3f up_lidar = R_level_lidar.row(2).transpose();
+  const Features features = extract_surfaces(scan, FeatureConfig{}, up_lidar);
+  for (const std::uint32_t i : features.surfaces) EXPECT_EQ(features.is_level[i], !is_wall[i]);
+  ASSERT_GT(features.upright_points.size(), 20U);
+  ASSERT_GT(features.level_points.size(), 50U);
+  for (const std::uint32_t i : features.upright_points) EXPECT_TRUE(is_wall[i]);
+  for (const std::uint32_t i : features.level_points) EXPECT_FALSE(is_wall[i]);
 }
 
 }  // namespace

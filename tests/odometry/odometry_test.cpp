@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 
 #include "tests/odometry/box_sequence.hpp"
@@ -183,6 +184,26 @@ TEST_F(OdometrySequence, PriorReplacesThePrediction) {
 }
 
 // A flash lidar, say, whose stamp is that of the message.
+/// The prior of the first scan, as a mount gives it, tells which way is up: what is level by the
+/// lidar's own axes are walls.
+TEST(Odometry, FollowsALidarOnItsSideInALevelMap) {
+  const BoxWorld world = test::street();
+  SensorModel sensor = test::test_lidar();
+  sensor.rings = 64;
+  sensor.fov_up = 0.4;
+  sensor.fov_down = -0.4;
+  const Eigen::AngleAxisd R_level_lidar(0.5 * M_PI, Eigen::Vector3d::UnitX());
+  Odometry odometry(OdometryConfig{}, sensor);
+  for (int k = 0; k < 25; ++k) {
+    const Eigen::Isometry3d T_map_lidar = BoxSequence::T_map_lidar_at(k) * R_level_lidar;
+    const Scan scan = world.scan(sensor, T_map_lidar, 0.1 * k).scan;
+    const auto prior = k == 0 ? std::optional(T_map_lidar) : std::nullopt;
+    const OdometryResult result = test::register_scan(odometry, scan, PointLabels{}, prior).result;
+    EXPECT_LE(result.health, OdometryHealth::good) << "scan " << k;
+    expect_near(result.T_map_lidar, T_map_lidar, 0.05, 0.005);
+  }
+}
+
 TEST_F(OdometrySequence, PosesAreAtTheStampWhenAllPointsAreOfAnotherTime) {
   for (const double late_scans : {0.5, -0.5}) {
     Odometry odometry(OdometryConfig{}, test::test_lidar());
