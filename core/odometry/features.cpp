@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "core/lidar/voxel_index.hpp"
+#include "core/odometry/points_in_air.hpp"
 #include "core/odometry/ring_order.hpp"
 #include "core/odometry/voxel_downsample.hpp"
 
@@ -222,6 +223,15 @@ class ColumnHeights {
   tsl::robin_map<std::uint64_t, Range, IndexHash> slices_;
 };
 
+/// All points of the scan but those in the air, as points_in_air() has them: these are round the
+/// lidar wherever it goes.
+std::vector<std::uint32_t> solid_points(const Scan& scan, const std::vector<bool>& in_air) {
+  std::vector<std::uint32_t> solid(scan.size());
+  std::iota(solid.begin(), solid.end(), 0U);
+  if (!in_air.empty()) std::erase_if(solid, [&](std::uint32_t i) { return in_air[i]; });
+  return solid;
+}
+
 /// So many of them, spread evenly.
 std::vector<std::uint32_t> some_of(const std::vector<std::uint32_t>& all, std::size_t max_count) {
   const std::size_t count = std::min(all.size(), max_count);
@@ -264,8 +274,7 @@ bool has_sparse_rings(const SensorModel& sensor) {
 
 Features extract_surfaces(const Scan& scan, const FeatureConfig& config,
                           const Eigen::Vector3f& up_lidar) {
-  std::vector<std::uint32_t> all(scan.size());
-  std::iota(all.begin(), all.end(), 0U);
+  const std::vector<std::uint32_t> all = solid_points(scan, points_in_air(scan.points_lidar));
   Features features;
   features.planes = voxel_downsample(scan.points_lidar, all, config.map_surface_spacing_m);
   features.surfaces =
@@ -291,19 +300,23 @@ Features extract_features(const Scan& scan, const FeatureConfig& config,
   tbb::parallel_for(std::size_t{0}, rings.count(), [&](std::size_t r) {
     of_ring[r] = features_of_ring(scan, rings.ring(r), config);
   });
+  const std::vector<bool> in_air = points_in_air(scan.points_lidar);
   std::vector<std::uint32_t> edges;
   std::vector<std::uint32_t> planes;
   for (const RingFeatures& ring : of_ring) {
     edges.insert(edges.end(), ring.edges.begin(), ring.edges.end());
     planes.insert(planes.end(), ring.planes.begin(), ring.planes.end());
   }
+  if (!in_air.empty()) {
+    std::erase_if(edges, [&](std::uint32_t i) { return in_air[i]; });
+    std::erase_if(planes, [&](std::uint32_t i) { return in_air[i]; });
+  }
   Features features;
   features.edges = voxel_downsample(scan.points_lidar, edges, config.edge_spacing_m);
   features.planes = voxel_downsample(scan.points_lidar, planes, config.map_plane_spacing_m);
   features.registered_planes =
       voxel_downsample(scan.points_lidar, features.planes, config.plane_spacing_m);
-  std::vector<std::uint32_t> all(scan.size());
-  std::iota(all.begin(), all.end(), 0U);
+  const std::vector<std::uint32_t> all = solid_points(scan, in_air);
   pick_points(scan, voxel_downsample(scan.points_lidar, all, map_point_spacing_m), up_lidar,
               features);
   return features;

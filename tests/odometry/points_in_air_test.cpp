@@ -1,0 +1,114 @@
+#include "core/odometry/points_in_air.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "core/odometry/features.hpp"
+
+namespace stillmap {
+namespace {
+
+/// A lidar of 32 rings over 40 degrees, 1.8 m above a road, with a wall, a pole of 5 cm and a bush
+/// beside it.
+struct Rain {
+  std::vector<Eigen::Vector3f> points_lidar;
+  std::vector<bool> is_drop;
+
+  /// `share` of the rays end on drops, most of them within some metres.
+  Rain(double share, unsigned seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> uniform(0.0, 1.0);
+    std::exponential_distribution<double> way(1.0 / 1.5);
+    constexpr int rings = 32;
+    constexpr int columns = 900;
+    for (int ring = 0; ring < rings; ++ring)
+      for (int column = 0; column < columns; ++column) {
+        const double elevation = (15.0 - 40.0 * ring / (rings - 1)) * std::numbers::pi / 180.0;
+        const double azimuth = 2.0 * std::numbers::pi * column / columns;
+        const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
+                                  std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+        const double range_m = range_of(ray, uniform(random));
+        const double drop_m = 0.6 + way(random);
+        const bool ends_on_drop = uniform(random) < share && drop_m < range_m;
+        if (!ends_on_drop && range_m > 80.0) continue;
+        points_lidar.push_back(
+            (std::min(range_m, drop_m + 100.0 * (ends_on_drop ? 0.0 : 1.0)) * ray).cast<float>());
+        is_drop.push_back(ends_on_drop);
+      }
+  }
+
+ private:
+  static double range_of(const Eigen::Vector3d& ray, double depth) {
+    double range_m = ray.z() < 0.0 ? -1.8 / ray.z() : 1000.0;
+    if (ray.y() > 0.0) range_m = std::min(range_m, 6.0 / ray.y());
+    range_m = std::min(range_m, range_to_cylinder(ray, {3.0, -1.0}, 0.025));
+    const double bush_m = range_to_cylinder(ray, {-3.0, -2.0}, 0.8);
+    return std::min(range_m, bush_m + depth);
+  }
+  static double range_to_cylinder(const Eigen::Vector3d& ray, const Eigen::Vector2d& centre,
+                                  double radius_m) {
+    const double a = ray.head<2>().squaredNorm();
+    const double b = ray.head<2>().dot(centre);
+    const double root = b * b - a * (centre.squaredNorm() - radius_m * radius_m);
+    return root < 0.0 || b < 0.0 ? 1000.0 : (b - std::sqrt(root)) / a;
+  }
+};
+
+TEST(PointsInAir, AreDropsAndNothingSolid) {
+  for (const double share : {0.03, 0.05, 0.10}) {
+    const Rain rain(share, 7);
+    const std::vector<bool> in_air = points_in_air(rain.points_lidar);
+    ASSERT_EQ(in_air.size(), rain.points_lidar.size()) << share;
+    double drops = 0.0, found = 0.0, solid = 0.0, mistaken = 0.0;
+    for (std::size_t i = 0; i < in_air.size(); ++i) {
+      (rain.is_drop[i] ? drops : solid) += 1.0;
+      if (in_air[i]) (rain.is_drop[i] ? found : mistaken) += 1.0;
+    }
+    EXPECT_GT(found, 0.85 * drops) << share;
+    EXPECT_LT(mistaken, 0.002 * solid) << share;
+  }
+}
+
+TEST(PointsInAir, ThePoleStays) {
+  const Rain rain(0.10, 8);
+  const std::vector<bool> in_air = points_in_air(rain.points_lidar);
+  ASSERT_FALSE(in_air.empty());
+  int of_pole = 0, kept = 0;
+  for (std::size_t i = 0; i < in_air.size(); ++i) {
+    const Eigen::Vector3f& point = rain.points_lidar[i];
+    if ((point.head<2>() - Eigen::Vector2f(3.0F, -1.0F)).norm() > 0.05F || rain.is_drop[i])
+      continue;
+    ++of_pole;
+    kept += in_air[i] ? 0 : 1;
+  }
+  ASSERT_GT(of_pole, 20);
+  EXPECT_GT(kept, 0.9 * of_pole);
+}
+
+TEST(PointsInAir, AreNoneInClearAirAndInEmptyScans) {
+  EXPECT_TRUE(points_in_air(Rain(0.0, 9).points_lidar).empty());
+  EXPECT_TRUE(points_in_air({}).empty());
+  const std::vector<Eigen::Vector3f> at_the_lidar(100, Eigen::Vector3f::Zero());
+  EXPECT_TRUE(points_in_air(at_the_lidar).empty());
+}
+
+TEST(ExtractSurfaces, LeavesOutWhatHangsInTheAir) {
+  const Rain rain(0.10, 10);
+  Scan scan;
+  scan.points_lidar = rain.points_lidar;
+  const Features features = extract_surfaces(scan, FeatureConfig{});
+  for (const auto* kind : {&features.planes, &features.surfaces, &features.points}) {
+    double drops = 0.0;
+    for (const std::uint32_t i : *kind) drops += rain.is_drop[i] ? 1.0 : 0.0;
+    EXPECT_LT(drops, 0.15 * static_cast<double>(kind->size()));
+  }
+}
+
+}  // namespace
+}  // namespace stillmap
