@@ -8,6 +8,10 @@ namespace {
 /// Rotation that must have been foretold: 2 degrees in all, and the share that may be missed.
 constexpr double proof_rad = 0.035;
 constexpr double max_missed_share = 0.1;
+/// Where a lidar shakes within its sweeps registration errs by more than that without the gyro:
+/// this share may be missed where it is no more than this of what repetition misses, too. One that
+/// says nothing, or of other axes, misses half of that at least.
+constexpr double max_missed_share_of_shaken = 0.3;
 /// Older scans count this much less with each scan.
 constexpr double proof_memory = 0.95;
 constexpr double recent_memory = 0.7;
@@ -33,15 +37,18 @@ void GyroTrust::add(const Eigen::Vector3d& registered, const Eigen::Vector3d& mi
   }
   registered_ = proof_memory * registered_ + registered.squaredNorm();
   missed_ = proof_memory * missed_ + missed_by_gyro.squaredNorm();
+  missed_by_repetition_ = proof_memory * missed_by_repetition_ + missed_by_repetition.squaredNorm();
+  const double shaken = std::min(registered_, missed_by_repetition_);
   is_believed_ =
-      registered_ > square(proof_rad) && missed_ < square(max_missed_share) * registered_;
+      registered_ > square(proof_rad) && (missed_ < square(max_missed_share) * registered_ ||
+                                          missed_ < square(max_missed_share_of_shaken) * shaken);
 }
 
 void GyroTrust::withdraw() {
   if (!is_believed_) return;
   is_believed_ = false;
   losses_ += 1;
-  registered_ = missed_ = 0.0;
+  registered_ = missed_ = missed_by_repetition_ = 0.0;
 }
 
 }  // namespace stillmap

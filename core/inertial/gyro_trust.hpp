@@ -27,6 +27,7 @@ class GyroTrust {
   /// Sums of squares since the gyro is not believed, the older the less [rad^2].
   double registered_ = 0.0;
   double missed_ = 0.0;
+  double missed_by_repetition_ = 0.0;
   /// Means of squares over the last scans [rad^2].
   double recent_missed_ = 0.0;
   double recent_missed_by_repetition_ = 0.0;

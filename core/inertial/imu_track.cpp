@@ -1,6 +1,7 @@
 #include "core/inertial/imu_track.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace stillmap {
@@ -12,6 +13,19 @@ constexpr std::size_t max_samples = 8000;
 constexpr int samples_after_clock_was_set = 100;
 /// Noise makes no sample like the one before: so many alike are those of a broken sensor.
 constexpr int max_repetitions = 10;
+/// So many rates that differ from one sample to the next are those of a gyro with noise.
+constexpr int min_changes = 10;
+/// A rate of such a gyro above this [rad/s] that is the same in more samples than this is the end
+/// of its range: the least that are sold go to 2 rad/s.
+constexpr double min_saturated_rate = 1.0;
+constexpr int max_fast_repetitions = 4;
+/// Up to three samples are a glitch where they differ from the median of the six others next to
+/// them by more than any robot's turn changes from one sample to the next, and than those differ
+/// among themselves: by this many times their median difference.
+constexpr std::ptrdiff_t samples_round_glitch = 6;
+constexpr double min_glitch_rad_s = 1.0;
+constexpr double max_angular_acceleration = 200.0;
+constexpr double min_glitch_deviations = 8.0;
 /// Beyond what is sold: 4000 degrees a second, 32 g.
 constexpr double max_rate_rad_s = 70.0;
 constexpr double max_acceleration_m_s2 = 320.0;
@@ -38,10 +52,10 @@ bool says_the_same(const ImuSample& a, const ImuSample& b) {
          a.acceleration_imu == b.acceleration_imu;
 }
 
-Eigen::Vector3d interpolated_rate(const ImuSample& a, const ImuSample& b, std::int64_t time_ns) {
-  const double share =
-      static_cast<double>(time_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns);
-  return a.angular_velocity_imu + share * (b.angular_velocity_imu - a.angular_velocity_imu);
+/// Of an even number of values: the mean of the two in the middle.
+double median_of(std::array<double, samples_round_glitch> values) {
+  std::ranges::sort(values);
+  return 0.5 * (values[values.size() / 2 - 1] + values[values.size() / 2]);
 }
 
 }  // namespace
@@ -57,6 +71,48 @@ Eigen::Quaterniond rotation_by(const Eigen::Vector3d& rotation_vector) {
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle, rotation_vector / angle));
 }
 
+bool ImuTrack::tells_rate(const Entry& entry) {
+  if (entry.repetitions >= max_repetitions) return false;
+  // A simulated one without noise may say the same for long, and be right.
+  const auto has_noise = entry.rate_changes >= min_changes;
+  const bool is_stuck = (entry.rate_repetitions >= max_repetitions).all() && has_noise.any();
+  const bool is_saturated = (entry.sample.angular_velocity_imu.array().abs() > min_saturated_rate &&
+                             entry.rate_repetitions >= max_fast_repetitions && has_noise)
+                                .any();
+  return !is_stuck && !is_saturated;
+}
+
+Eigen::Vector3d ImuTrack::interpolated_rate(const Entry& a, const Entry& b, std::int64_t time_ns) {
+  const double share = static_cast<double>(time_ns - a.sample.stamp_ns) /
+                       static_cast<double>(b.sample.stamp_ns - a.sample.stamp_ns);
+  return a.rate_imu + share * (b.rate_imu - a.rate_imu);
+}
+
+Eigen::Vector3d ImuTrack::rate_without_glitch(std::ptrdiff_t index) const {
+  const auto at = [&](std::ptrdiff_t k) -> const ImuSample& {
+    return (entries_.begin() + k)->sample;
+  };
+  const auto count = static_cast<std::ptrdiff_t>(entries_.size());
+  Eigen::Vector3d rate = at(index).angular_velocity_imu;
+  if (count <= samples_round_glitch) return rate;
+  const std::ptrdiff_t first = std::clamp<std::ptrdiff_t>(index - samples_round_glitch / 2, 0,
+                                                          count - 1 - samples_round_glitch);
+  const double step_s = seconds(at(first + samples_round_glitch).stamp_ns - at(first).stamp_ns) /
+                        static_cast<double>(samples_round_glitch);
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    std::array<double, samples_round_glitch> others{};
+    for (std::ptrdiff_t k = 0; k < samples_round_glitch; ++k)
+      others[static_cast<std::size_t>(k)] =
+          at(first + k + (first + k >= index ? 1 : 0)).angular_velocity_imu(axis);
+    const double median = median_of(others);
+    for (double& other : others) other = std::abs(other - median);
+    const double bearable = std::max({min_glitch_rad_s, max_angular_acceleration * step_s,
+                                      min_glitch_deviations * median_of(others)});
+    if (std::abs(rate(axis) - median) > bearable) rate(axis) = median;
+  }
+  return rate;
+}
+
 ImuSampleFate ImuTrack::add(const ImuSample& sample) {
   if (!is_usable(sample)) return ImuSampleFate::not_usable;
   if (!entries_.empty() && sample.stamp_ns <= entries_.back().sample.stamp_ns) {
@@ -64,9 +120,24 @@ ImuSampleFate ImuTrack::add(const ImuSample& sample) {
     entries_.clear();
   }
   out_of_order_ = 0;
-  const bool repeats = !entries_.empty() && says_the_same(entries_.back().sample, sample);
-  entries_.push_back({sample, repeats ? entries_.back().repetitions + 1 : 0});
+  Entry entry{.sample = sample, .rate_imu = sample.angular_velocity_imu};
+  if (!entries_.empty()) {
+    const Entry& last = entries_.back();
+    if (says_the_same(last.sample, sample)) entry.repetitions = last.repetitions + 1;
+    const auto repeats =
+        sample.angular_velocity_imu.array() == last.sample.angular_velocity_imu.array();
+    entry.rate_repetitions = repeats.select(last.rate_repetitions + 1, 0);
+    // Of a coarse scale two in a row may be the same.
+    const auto goes_on = last.rate_repetitions <= 1;
+    entry.rate_changes =
+        repeats.select(last.rate_changes, goes_on.select(last.rate_changes + 1, 1));
+  }
+  entries_.push_back(entry);
   if (entries_.size() > max_samples) entries_.pop_front();
+  // The newest ones are judged again by those that come after them.
+  const auto count = static_cast<std::ptrdiff_t>(entries_.size());
+  for (auto k = std::max<std::ptrdiff_t>(0, count - 1 - samples_round_glitch / 2); k < count; ++k)
+    (entries_.begin() + k)->rate_imu = rate_without_glitch(k);
   return ImuSampleFate::taken;
 }
 
@@ -83,8 +154,8 @@ std::optional<Eigen::Vector3d> ImuTrack::rate_at(std::int64_t time_ns) const {
   const auto entry = before(time_ns);
   if (entry == entries_.end()) return std::nullopt;
   const auto next = std::next(entry);
-  if (next == entries_.end()) return entry->sample.angular_velocity_imu;
-  return interpolated_rate(entry->sample, next->sample, time_ns);
+  if (next == entries_.end()) return entry->rate_imu;
+  return interpolated_rate(*entry, *next, time_ns);
 }
 
 std::optional<Eigen::Quaterniond> ImuTrack::rotation(std::int64_t from_ns, std::int64_t to_ns,
@@ -101,10 +172,10 @@ std::optional<Eigen::Quaterniond> ImuTrack::rotation(std::int64_t from_ns, std::
     const auto next = std::next(entry);
     if (next == entries_.end()) return std::nullopt;
     if (next->sample.stamp_ns - entry->sample.stamp_ns > max_gap_ns) return std::nullopt;
-    if (next->repetitions >= max_repetitions) return std::nullopt;
+    if (!tells_rate(*next)) return std::nullopt;
     const std::int64_t end_ns = std::min(next->sample.stamp_ns, to_ns);
-    const Eigen::Vector3d rate = 0.5 * (interpolated_rate(entry->sample, next->sample, time_ns) +
-                                        interpolated_rate(entry->sample, next->sample, end_ns));
+    const Eigen::Vector3d rate = 0.5 * (interpolated_rate(*entry, *next, time_ns) +
+                                        interpolated_rate(*entry, *next, end_ns));
     R_from_t = R_from_t * rotation_by(seconds(end_ns - time_ns) * (rate - bias_imu));
     time_ns = end_ns;
     entry = next;
@@ -124,14 +195,14 @@ std::optional<SteadyMean> ImuTrack::steady_mean(std::int64_t from_ns, std::int64
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
   for (auto entry = first; entry != last; ++entry) {
-    rate += entry->sample.angular_velocity_imu / static_cast<double>(count);
+    rate += entry->rate_imu / static_cast<double>(count);
     acceleration += entry->sample.acceleration_imu / static_cast<double>(count);
   }
   double rate_variance = 0.0;
   double acceleration_variance = 0.0;
   for (auto entry = first; entry != last; ++entry) {
     const auto n = static_cast<double>(count);
-    rate_variance += (entry->sample.angular_velocity_imu - rate).squaredNorm() / n;
+    rate_variance += (entry->rate_imu - rate).squaredNorm() / n;
     acceleration_variance += (entry->sample.acceleration_imu - acceleration).squaredNorm() / n;
   }
   const bool is_steady =

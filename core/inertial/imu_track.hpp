@@ -41,7 +41,8 @@ class ImuTrack {
   [[nodiscard]] ImuSampleFate add(const ImuSample& sample);
 
   /// Takes directions of the IMU at `to_ns` to those at `from_ns`, by its rates less `bias_imu`
-  /// [rad/s]. Nothing where samples are missing, or say the same again and again.
+  /// [rad/s]. Nothing where samples are missing, where all or the rates of turn say the same again
+  /// and again, or where one of these is beyond what the gyro measures.
   [[nodiscard]] std::optional<Eigen::Quaterniond> rotation(std::int64_t from_ns, std::int64_t to_ns,
                                                            const Eigen::Vector3d& bias_imu) const;
 
@@ -60,10 +61,22 @@ class ImuTrack {
  private:
   struct Entry {
     ImuSample sample;
+    /// Without glitches of single samples [rad/s].
+    Eigen::Vector3d rate_imu = Eigen::Vector3d::Zero();
     /// Samples in a row up to this one that say the same.
     int repetitions = 0;
+    /// The same of the rate about each axis, and samples in a row before those whose rates
+    /// differed, as noise has it.
+    Eigen::Array3i rate_repetitions = Eigen::Array3i::Zero();
+    Eigen::Array3i rate_changes = Eigen::Array3i::Zero();
   };
   using Entries = std::deque<Entry>;
+
+  [[nodiscard]] static bool tells_rate(const Entry& entry);
+  [[nodiscard]] static Eigen::Vector3d interpolated_rate(const Entry& a, const Entry& b,
+                                                         std::int64_t time_ns);
+  /// The rate of an entry or, where single samples there are far from all round them, theirs.
+  [[nodiscard]] Eigen::Vector3d rate_without_glitch(std::ptrdiff_t index) const;
 
   /// The last entry that is not after `time_ns`, where one follows it closely.
   [[nodiscard]] Entries::const_iterator before(std::int64_t time_ns) const;

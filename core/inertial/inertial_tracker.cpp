@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <utility>
 
 namespace stillmap {
 namespace {
@@ -117,25 +118,32 @@ UpDirection InertialTracker::up_lidar(std::int64_t time_ns) const {
   return {.up_lidar = R_lidar_imu_ * mean->up_imu};
 }
 
-void InertialTracker::learn(std::int64_t from_ns, std::int64_t to_ns,
-                            const Eigen::Matrix3d& R_from_to) {
+std::optional<Eigen::Vector3d> InertialTracker::missed_by_gyro(std::int64_t from_ns,
+                                                               std::int64_t to_ns,
+                                                               const Eigen::Matrix3d& R_from_to) {
   const double duration_s = seconds(to_ns - from_ns);
-  if (!(duration_s > 0.0)) return;
+  if (!(duration_s > 0.0)) return std::nullopt;
   const Eigen::Vector3d registered = rotation_vector(Eigen::Quaterniond(R_from_to));
-  const auto last_rate = last_rate_lidar_;
-  last_rate_lidar_ = registered / duration_s;
+  const auto last_rate = std::exchange(last_rate_lidar_, registered / duration_s);
   const auto R_gyro = rotation_lidar(from_ns, to_ns);
-  const auto rate_from = track_.rate_at(imu_time(from_ns));
-  const auto rate_to = track_.rate_at(imu_time(to_ns));
-  if (!R_gyro || !rate_from || !rate_to) return;
+  if (!R_gyro) return std::nullopt;
   const Eigen::Vector3d missing =
       rotation_vector(Eigen::Quaterniond(R_gyro->transpose() * R_from_to));
   if (last_rate) trust_.add(registered, missing, registered - duration_s * *last_rate);
   if (registered.norm() > min_turn_rad) unbelieved_turn_rad_ += registered.norm();
   if (trust_.is_believed()) unbelieved_turn_rad_ = 0.0;
-  (void)calibration_.learn_from_rotation(R_lidar_imu_.conjugate() * missing, duration_s,
-                                         *rate_to - *rate_from);
-  learn_at_rest(from_ns, to_ns, registered);
+  return missing;
+}
+
+void InertialTracker::learn(std::int64_t from_ns, std::int64_t to_ns,
+                            const Eigen::Matrix3d& R_from_to) {
+  const auto missing = missed_by_gyro(from_ns, to_ns, R_from_to);
+  const auto rate_from = track_.rate_at(imu_time(from_ns));
+  const auto rate_to = track_.rate_at(imu_time(to_ns));
+  if (!missing || !rate_from || !rate_to) return;
+  (void)calibration_.learn_from_rotation(R_lidar_imu_.conjugate() * *missing,
+                                         seconds(to_ns - from_ns), *rate_to - *rate_from);
+  learn_at_rest(from_ns, to_ns, rotation_vector(Eigen::Quaterniond(R_from_to)));
 }
 
 void InertialTracker::learn_at_rest(std::int64_t from_ns, std::int64_t to_ns,

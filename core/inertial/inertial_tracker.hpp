@@ -60,6 +60,11 @@ class InertialTracker {
 
   /// The lidar's rotation between two times was found by registration.
   void learn(std::int64_t from_ns, std::int64_t to_ns, const Eigen::Matrix3d& R_from_to);
+  /// The same where the pose is in some doubt: it tells whether the gyro is to be believed, but not
+  /// its bias and delay. A gyro that warps the scans leaves no other poses.
+  void judge(std::int64_t from_ns, std::int64_t to_ns, const Eigen::Matrix3d& R_from_to) {
+    (void)missed_by_gyro(from_ns, to_ns, R_from_to);
+  }
 
   /// The next pose does not go on from the last one that was learnt.
   void forget_motion() {
@@ -87,6 +92,9 @@ class InertialTracker {
  private:
   [[nodiscard]] std::optional<Eigen::Matrix3d> rotation_lidar(std::int64_t from_ns,
                                                               std::int64_t to_ns) const;
+  /// What the gyro misses of a rotation, which is judged by it; nothing where samples are missing.
+  std::optional<Eigen::Vector3d> missed_by_gyro(std::int64_t from_ns, std::int64_t to_ns,
+                                                const Eigen::Matrix3d& R_from_to);
   /// Poses of which the second one is turned by `registered` [rad].
   void learn_at_rest(std::int64_t from_ns, std::int64_t to_ns, const Eigen::Vector3d& registered);
 

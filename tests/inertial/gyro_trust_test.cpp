@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <random>
+
 namespace stillmap {
 namespace {
 
@@ -33,6 +36,47 @@ TEST(GyroTrust, NeverBelievesOtherUnitsSignsOrSilence) {
     drive(trust, factor, 200);
     EXPECT_FALSE(trust.is_believed()) << factor;
     EXPECT_EQ(trust.losses(), 0);
+  }
+}
+
+/// A lidar that is swung to and fro three times a second, by which its sweeps are bent as long as
+/// the gyro does not straighten them: what is registered errs by 0.4 degrees.
+void shake(GyroTrust& trust, double factor, int scans) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> error(0.0, 0.25 * deg);
+  Eigen::Vector3d last = Eigen::Vector3d::Zero();
+  for (int k = 0; k < scans; ++k) {
+    const Eigen::Vector3d rotation(3.0 * deg * std::sin(0.6 * M_PI * k), 0.0, 0.0);
+    const Eigen::Vector3d registered =
+        rotation + Eigen::Vector3d(error(random), error(random), error(random));
+    trust.add(registered, registered - factor * rotation, registered - last);
+    last = registered;
+  }
+}
+
+TEST(GyroTrust, BelievesAGyroThatForetellsWhatShakesTheLidar) {
+  GyroTrust trust;
+  shake(trust, 1.0, 30);
+  EXPECT_TRUE(trust.is_believed());
+  for (const double factor : {57.3, 1.0 / 57.3, -1.0, 0.0, 0.5}) {
+    GyroTrust wrong;
+    shake(wrong, factor, 200);
+    EXPECT_FALSE(wrong.is_believed()) << factor;
+  }
+}
+
+TEST(GyroTrust, IsNotWonByTheNoiseOfALidarThatRests) {
+  GyroTrust trust;
+  std::mt19937 random(3);
+  std::normal_distribution<double> error(0.0, 0.3 * deg);
+  Eigen::Vector3d last = Eigen::Vector3d::Zero(), last_pose = last;
+  for (int k = 0; k < 500; ++k) {
+    const Eigen::Vector3d pose(error(random), error(random), error(random));
+    const Eigen::Vector3d registered = pose - last_pose;
+    trust.add(registered, registered, registered - last);
+    EXPECT_FALSE(trust.is_believed()) << k;
+    last = registered;
+    last_pose = pose;
   }
 }
 

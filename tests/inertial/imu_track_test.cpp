@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <random>
 
 namespace stillmap {
 namespace {
@@ -85,6 +86,64 @@ TEST(ImuTrack, DoesNotBelieveAFrozenSensor) {
   }
   EXPECT_FALSE(track.rotation(1300 * ms, 1400 * ms, Eigen::Vector3d::Zero()));
   EXPECT_TRUE(track.rotation(900 * ms, 1000 * ms, Eigen::Vector3d::Zero()));
+}
+
+/// A gyro with noise that turns at `rate_z(t)` about z, what is measured bent by `spoil(k, rate)`.
+template <typename Rate, typename Spoil>
+ImuTrack noisy_track(Rate rate_z, Spoil spoil) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0.0, 0.003);
+  ImuTrack track;
+  for (int k = 0; k <= 400; ++k) {
+    Eigen::Vector3d rate(noise(random), noise(random), rate_z(0.005 * k) + noise(random));
+    spoil(k, rate);
+    EXPECT_EQ(track.add({k * 5 * ms, rate, {0.0, noise(random), 9.81}}), ImuSampleFate::taken);
+  }
+  return track;
+}
+
+double swing(double t) { return 2.5 * std::sin(3.0 * t); }
+/// Its integral.
+double swung(double from_s, double to_s) {
+  return 2.5 / 3.0 * (std::cos(3.0 * from_s) - std::cos(3.0 * to_s));
+}
+
+TEST(ImuTrack, DoesNotTurnByGlitches) {
+  for (const int length : {1, 3}) {
+    const ImuTrack track = noisy_track(swing, [&](int k, Eigen::Vector3d& rate) {
+      if (k % 40 >= 10 && k % 40 < 10 + length) rate(k / 40 % 3) += k % 80 < 40 ? 30.0 : -8.0;
+    });
+    for (int from_ms = 0; from_ms < 2000; from_ms += 100)
+      EXPECT_NEAR(yaw_between(track, from_ms * ms, (from_ms + 100) * ms),
+                  swung(0.001 * from_ms, 0.001 * from_ms + 0.1), 0.003)
+          << length << " samples, " << from_ms << " ms";
+  }
+}
+
+TEST(ImuTrack, TurnsByShocksThatLastAndByTurnsThatSetIn) {
+  // 60 ms of a wheel over a kerb, and a turn that sets in within a sample.
+  const auto rate = [](double t) {
+    return (t > 0.5 && t < 0.56 ? 6.0 : 0.0) + (t > 1.2 ? 3.0 : 0.0);
+  };
+  const ImuTrack track = noisy_track(rate, [](int, Eigen::Vector3d&) {});
+  EXPECT_NEAR(yaw_between(track, 400 * ms, 700 * ms), 0.36, 0.04);
+  EXPECT_NEAR(yaw_between(track, 1100 * ms, 1400 * ms), 0.6, 0.02);
+}
+
+TEST(ImuTrack, SaysNothingWhereTheGyroIsAtTheEndOfItsRangeOrStuck) {
+  const auto no_bias = Eigen::Vector3d::Zero();
+  const ImuTrack saturated = noisy_track(
+      swing, [](int, Eigen::Vector3d& rate) { rate = rate.cwiseMax(-2.0).cwiseMin(2.0); });
+  EXPECT_TRUE(saturated.rotation(0, 200 * ms, no_bias));
+  EXPECT_FALSE(saturated.rotation(450 * ms, 550 * ms, no_bias));
+  EXPECT_TRUE(saturated.rotation(800 * ms, 1200 * ms, no_bias));
+  // Its accelerations go on.
+  Eigen::Vector3d held = no_bias;
+  const ImuTrack stuck = noisy_track(swing, [&](int k, Eigen::Vector3d& rate) {
+    (k < 200 ? held : rate) = k < 200 ? rate : held;
+  });
+  EXPECT_TRUE(stuck.rotation(800 * ms, 900 * ms, no_bias));
+  EXPECT_FALSE(stuck.rotation(1100 * ms, 1200 * ms, no_bias));
 }
 
 TEST(ImuTrack, LeavesOutWhatIsNoMeasurement) {

@@ -94,6 +94,21 @@ TEST(InertialTracker, IsNotBelievedWithWrongUnitsOrAxes) {
   EXPECT_LT(turned.calibration().bias_imu().norm(), 0.05);
 }
 
+TEST(InertialTracker, IsNoLongerBelievedByPosesInDoubtEither) {
+  InertialTracker tracker(ImuMount{});
+  drive(tracker, {}, 10.0);
+  ASSERT_TRUE(tracker.is_believed());
+  const Eigen::Vector3d bias_imu = tracker.calibration().bias_imu();
+  std::mt19937 random(7);
+  for (int k = 2010; k < 2100; ++k) tracker.add(sample_at({}, k, random));
+  // The lidar turned about another axis than the gyro says.
+  for (int scan = 101; scan < 105; ++scan)
+    tracker.judge((scan - 1) * 100 * per_ms, scan * 100 * per_ms,
+                  rotation_by({scan % 2 == 0 ? 0.1 : 0.05, 0.0, 0.0}).toRotationMatrix());
+  EXPECT_FALSE(tracker.is_believed());
+  EXPECT_EQ(tracker.calibration().bias_imu(), bias_imu);
+}
+
 TEST(InertialTracker, SaysNothingWhereSamplesAreMissing) {
   InertialTracker tracker(ImuMount{});
   drive(tracker, {}, 10.0);
