@@ -7,8 +7,10 @@
 namespace stillmap {
 namespace {
 
-/// Of rotations from scan to scan as registration finds them [rad].
+/// Of rotations from scan to scan as registration finds them [rad]: at least this, and what has
+/// been missing lately where that is more, as where the lidar shakes within its sweeps.
 constexpr double registered_deviation_rad = 1e-3;
+constexpr double missing_memory = 0.9;
 /// Of the mean of rates at rest [rad/s]: registration does not show slower turns than this.
 constexpr double rest_deviation_rad_s = 1e-3;
 /// So many means at rest in a row that the bias does not explain, and that differ by no more than
@@ -32,7 +34,11 @@ bool GyroCalibration::learn_from_rotation(const Eigen::Vector3d& missing_imu, do
   covariance_(3, 3) += offset_drift * duration_s;
   Observation observation;
   observation << -duration_s * Eigen::Matrix3d::Identity(), rate_change_imu;
-  return update(missing_imu, observation, registered_deviation_rad);
+  if (!missing_imu.allFinite()) return false;
+  squared_missing_ =
+      missing_memory * squared_missing_ + (1.0 - missing_memory) * missing_imu.squaredNorm() / 3.0;
+  return update(missing_imu, observation,
+                std::max(registered_deviation_rad, std::sqrt(squared_missing_)));
 }
 
 void GyroCalibration::learn_at_rest(const Eigen::Vector3d& mean_rate_imu) {

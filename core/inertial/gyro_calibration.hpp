@@ -39,6 +39,8 @@ class GyroCalibration {
   double time_offset_s_;
   /// 1 degree a second and 20 ms.
   Covariance covariance_ = State(3e-4, 3e-4, 3e-4, 4e-4).asDiagonal();
+  /// Mean square of what was missing lately, of one axis [rad^2]; at first that of half a degree.
+  double squared_missing_ = 7.6e-5;
   /// At rest, since one was explained: the last mean rate that was not, and how many say the same.
   Eigen::Vector3d unexplained_rate_imu_ = Eigen::Vector3d::Zero();
   int unexplained_rests_ = 0;

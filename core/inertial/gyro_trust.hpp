@@ -27,7 +27,22 @@ class GyroTrust {
   /// Sums of squares since the gyro is not believed, the older the less [rad^2].
   double registered_ = 0.0;
   double missed_ = 0.0;
-  double missed_by_repetition_ = 0.0;
+  /// Whether turns are foretold of which registration errs by much.
+  class Shaken {
+   public:
+    void add(const Eigen::Vector3d& registered, const Eigen::Vector3d& missed_by_gyro,
+             const Eigen::Vector3d& missed_by_repetition);
+    [[nodiscard]] bool is_foretold() const;
+
+   private:
+    double registered_ = 0.0;
+    double missed_ = 0.0;
+    double missed_by_repetition_ = 0.0;
+    /// Sums of products of what the gyro tells, and of what it misses, with what it tells.
+    Eigen::Matrix3d by_gyro_ = Eigen::Matrix3d::Zero();
+    Eigen::Matrix3d common_ = Eigen::Matrix3d::Zero();
+  };
+  Shaken shaken_;
   /// Means of squares over the last scans [rad^2].
   double recent_missed_ = 0.0;
   double recent_missed_by_repetition_ = 0.0;

@@ -27,6 +27,26 @@ TEST(GyroCalibration, FindsBiasAndDelayFromRotationsWithNoise) {
   EXPECT_NEAR(calibration.time_offset_s(), delay_s, 0.0005);
 }
 
+TEST(GyroCalibration, TakesRotationsOfAShakenLidarForWhatTheyAre) {
+  // Sweeps that bend make errors of half a degree, which no bias is.
+  const Eigen::Vector3d bias(0.006, -0.004, 0.009);
+  GyroCalibration calibration(0.0);
+  std::mt19937 random(1);
+  std::normal_distribution<double> error(0.0, 0.009);
+  Eigen::Vector3d last = Eigen::Vector3d::Zero();
+  for (int k = 0; k < 300; ++k) {
+    const Eigen::Vector3d now(error(random), error(random), error(random));
+    const Eigen::Vector3d change(2.0 * std::sin(k), 0.0, 0.0);
+    (void)calibration.learn_from_rotation(
+        -0.1 * (bias - calibration.bias_imu()) - calibration.time_offset_s() * change + now - last,
+        0.1, change);
+    last = now;
+    EXPECT_LT(calibration.bias_imu().norm(), 0.03) << k;
+  }
+  EXPECT_LT((calibration.bias_imu() - bias).norm(), 0.01);
+  EXPECT_LT(std::abs(calibration.time_offset_s()), 0.002);
+}
+
 TEST(GyroCalibration, LearnsTheBiasAtRestAtOnce) {
   GyroCalibration calibration(0.0);
   const Eigen::Vector3d bias(0.008, 0.002, -0.005);
@@ -39,6 +59,7 @@ TEST(GyroCalibration, LearnsNothingFromWhatNoBiasExplains) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(calibration.learn_from_rotation({0.0, 0.0, 1.0}, 0.1, Eigen::Vector3d::Zero()));
   EXPECT_FALSE(calibration.learn_from_rotation({nan, 0.0, 0.0}, 0.1, Eigen::Vector3d::Zero()));
+  EXPECT_TRUE(calibration.learn_from_rotation({0.0, 0.0, 0.0}, 0.1, Eigen::Vector3d::Zero()));
   EXPECT_EQ(calibration.bias_imu(), Eigen::Vector3d(0.0, 0.0, 0.0));
 }
 
