@@ -247,6 +247,8 @@ void Odometry::State::begin_anew(const FeatureSets& features, OdometryResult& re
   // Another lidar may have been told since.
   is_by_surfaces = is_registered_by_surfaces(sensor, config);
   result = OdometryResult{.T_map_lidar = last.T_map_lidar};
+  // Nobody knows where it is to the one before, which may be in a map.
+  result.map_entry = MapEntry::stays_out;
 }
 
 void Odometry::State::forget_stretch() {

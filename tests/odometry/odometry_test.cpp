@@ -312,6 +312,25 @@ TEST_F(OdometrySequence, TheCovarianceOfALostLidarGrowsWithTheTime) {
   EXPECT_LT(std::sqrt(lost.covariance(5, 5)), 2.0);
 }
 
+TEST_F(OdometrySequence, AFirstScanThatReplacesOneStaysOutOfTheMap) {
+  Odometry odometry(OdometryConfig{}, test::test_lidar());
+  const OdometryResult first =
+      test::register_scan(odometry, quiet().scans[0].scan, PointLabels{}, std::nullopt).result;
+  ASSERT_EQ(first.health, OdometryHealth::initialised);
+  EXPECT_TRUE(first.is_confirmed());
+  // A street that stands on its side lies nowhere on that.
+  const auto sideways = [&](std::size_t k) {
+    Scan scan = quiet().scans[k].scan;
+    for (Eigen::Vector3f& p : scan.points_lidar) p = Eigen::Vector3f(p.z(), p.x(), p.y());
+    return test::register_scan(odometry, scan, PointLabels{}, std::nullopt).result;
+  };
+  OdometryResult found = sideways(1);
+  for (std::size_t k = 2; k < 6 && found.health == OdometryHealth::lost; ++k) found = sideways(k);
+  ASSERT_EQ(found.health, OdometryHealth::initialised);
+  // Nobody knows where it is to the one before.
+  EXPECT_FALSE(found.is_confirmed());
+}
+
 /// The street, and cars that keep the lidar's pace beside and ahead of it.
 BoxWorld street_with_convoy(std::initializer_list<double> lanes_y_m) {
   BoxWorld world = test::street();
