@@ -112,4 +112,43 @@ void RangeImage::find_nearest() {
   }
 }
 
+template <class Use>
+void RangeImage::for_each_gap(int max_gap, const Use& use) const {
+  for (int row = 0; row < rows_; ++row) {
+    int last = -1;
+    // Once round, and on to the end of a gap that lies across the border.
+    for (int c = 0; c < columns_ + std::min(max_gap + 1, columns_); ++c) {
+      if (nearest_[pixel(row, c < columns_ ? c : c - columns_)] == none) continue;
+      if (last >= 0 && last < columns_ && c - last - 1 <= max_gap) use(row, last, c - last - 1);
+      last = c;
+    }
+  }
+}
+
+double RangeImage::share_in_gaps(int max_gap) const {
+  std::size_t seen = 0, in_gaps = 0;
+  for_each_gap(max_gap, [&](int, int, int empty) {
+    ++seen;
+    in_gaps += static_cast<std::size_t>(empty);
+  });
+  return seen == 0 ? 0.0 : static_cast<double>(in_gaps) / static_cast<double>(seen + in_gaps);
+}
+
+RangeImage RangeImage::with_gaps_filled(int max_gap) const {
+  RangeImage filled = *this;
+  for_each_gap(max_gap, [&](int row, int column, int empty) {
+    const std::size_t first = pixel(row, column);
+    const std::size_t last = pixel(row, (column + empty + 1) % columns_);
+    for (int k = 1; k <= empty; ++k) {
+      const int from_last = empty + 1 - k;
+      const bool takes_first = k != from_last ? k < from_last : range_m_[first] <= range_m_[last];
+      const std::size_t source = takes_first ? first : last;
+      const std::size_t into = pixel(row, (column + k) % columns_);
+      filled.nearest_[into] = nearest_[source];
+      filled.range_m_[into] = range_m_[source];
+    }
+  });
+  return filled;
+}
+
 }  // namespace stillmap

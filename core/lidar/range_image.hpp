@@ -60,9 +60,21 @@ class RangeImage {
   /// Range of each point [m]; not finite where the point is not.
   [[nodiscard]] std::span<const float> range_of_point_m() const { return range_of_point_m_; }
 
+  /// Empty pixels between two that see something in one row, at most `max_gap` of them side by
+  /// side, as a share of both: near 0 where a lidar fires once a column, 0.5 where it does every
+  /// other one. Rows go round.
+  [[nodiscard]] double share_in_gaps(int max_gap) const;
+  /// The image in which these pixels see what the nearer end of their gap does; in the middle of it
+  /// the end of less range. Points keep their pixels.
+  [[nodiscard]] RangeImage with_gaps_filled(int max_gap) const;
+
  private:
   void project(std::span<const Eigen::Vector3f> points_lidar, const ProjectionModel& model);
   void find_nearest();
+  /// Calls `use(row, column, empty)` for each pixel that sees something, where the next one that
+  /// does follows in its row after at most `max_gap` empty ones.
+  template <class Use>
+  void for_each_gap(int max_gap, const Use& use) const;
 
   int rows_;
   int columns_;

@@ -161,6 +161,44 @@ TEST(RangeImage, BearsNoPointsAndManyEqualPoints) {
   EXPECT_EQ(crowded.nearest()[static_cast<std::size_t>(crowded.pixel_of_point()[0])], 0);
 }
 
+/// Row 0 of an image of 16 columns, of which `columns` see a point at these ranges.
+RangeImage row_of(const std::vector<int>& columns, const std::vector<double>& ranges_m) {
+  std::vector<Eigen::Vector3f> points;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const double azimuth = pi * (1.0 - (columns[i] + 0.5) / 8.0);
+    points.push_back(
+        (ranges_m[i] * Eigen::Vector3d(std::cos(azimuth), std::sin(azimuth), 0.5)).cast<float>());
+  }
+  return {points, {.rows = 2, .columns = 16, .fov_up = 0.9, .fov_down = -0.9}};
+}
+
+TEST(RangeImage, TellsWhatShareOfItsColumnsALidarSkips) {
+  EXPECT_EQ(row_of({}, {}).share_in_gaps(3), 0.0);
+  EXPECT_EQ(row_of({5}, {4.0}).share_in_gaps(3), 0.0);
+  const std::vector<double> alike(16, 4.0);
+  EXPECT_EQ(row_of({0, 1, 2, 3, 8}, alike).share_in_gaps(3), 0.0) << "four empty ones are no gap";
+  EXPECT_EQ(row_of({0, 2, 4, 6, 8, 10, 12, 14}, alike).share_in_gaps(3), 0.5);
+  EXPECT_NEAR(row_of({1, 14}, alike).share_in_gaps(3), 2.0 / 3.0, 1e-9) << "across the border";
+}
+
+TEST(RangeImage, FillsGapsWithWhatTheNearerEndSees) {
+  const RangeImage image = row_of({2, 6, 9, 15}, {5.0, 4.0, 7.0, 8.0});
+  const RangeImage filled = image.with_gaps_filled(3);
+  constexpr std::int32_t none = RangeImage::none;
+  // Of equally near ends the one of less range; of four empty ones together and more none.
+  const std::vector<std::int32_t> expected{3, 0, 0,    0,    1,    1,    1,    1,
+                                           2, 2, none, none, none, none, none, 3};
+  EXPECT_EQ(std::vector(filled.nearest().begin(), filled.nearest().begin() + 16), expected);
+  for (std::size_t pixel = 0; pixel < 16; ++pixel) {
+    const float range_m = expected[pixel] == none
+                              ? -1.0F
+                              : image.range_of_point_m()[static_cast<std::size_t>(expected[pixel])];
+    EXPECT_EQ(filled.range_m()[pixel], range_m);
+  }
+  EXPECT_TRUE(std::ranges::equal(filled.pixel_of_point(), image.pixel_of_point()));
+  EXPECT_TRUE(std::ranges::all_of(filled.nearest().subspan(16), [](auto p) { return p == none; }));
+}
+
 TEST(Unproject, GivesEachPointTheValueOfItsPixel) {
   auto points = random_points(2000, 14);
   points.emplace_back(0, 0, 0);

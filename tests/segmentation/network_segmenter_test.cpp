@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <ctime>
 #include <filesystem>
 #include <limits>
+#include <numbers>
 #include <thread>
 #include <vector>
 
@@ -166,6 +168,52 @@ class OneClass final : public SegmentationNetwork {
   std::size_t pixels_;
   std::uint8_t output_;
 };
+
+/// Keeps how many pixels of the last image saw something.
+class CountsPixels final : public SegmentationNetwork {
+ public:
+  explicit CountsPixels(std::size_t& seen) : seen_(seen) {}
+  PixelOutputs run(std::span<const float> input) override {
+    const std::size_t pixels = input.size() / plain_input_channels;
+    const auto ranges = input.first(pixels);
+    seen_ = pixels - static_cast<std::size_t>(std::ranges::count(ranges, 0.0F));
+    return {.output = std::vector<std::uint8_t>(pixels, 9),
+            .confidence = std::vector(pixels, 1.0F)};
+  }
+  std::vector<float> probabilities(std::span<const float> /*input*/) override { return {}; }
+  [[nodiscard]] std::string engine() const override { return "counts pixels"; }
+
+ private:
+  std::size_t& seen_;
+};
+
+/// A ring of points, `azimuths` to the turn.
+Scan level_ring(int azimuths) {
+  Scan scan;
+  for (int k = 0; k < azimuths; ++k) {
+    const double a = 2.0 * std::numbers::pi * (k + 0.5) / azimuths;
+    scan.points_lidar.push_back(
+        Eigen::Vector3d(9.0 * std::cos(a), 9.0 * std::sin(a), 0.1).cast<float>());
+  }
+  return scan;
+}
+
+TEST(NetworkSegmenter, FillsTheGapsOfALidarThatFiresAtFewerAzimuthsThanTheImageHasColumns) {
+  ModelDescription model = describe(random_network(2, 64, 20));
+  model.follow_sensor = true;
+  std::size_t seen = 0;
+  NetworkSegmenter labels(model, std::make_unique<CountsPixels>(seen));
+  EXPECT_EQ(labels.segment(level_ring(32)).classes, std::vector(32, SemanticClass::road));
+  EXPECT_EQ(seen, 64U);
+  static_cast<void>(labels.segment(level_ring(54)));
+  EXPECT_EQ(seen, 54U) << "as real lidars have them in images of their width";
+  static_cast<void>(labels.segment(level_ring(8)));
+  EXPECT_EQ(seen, 8U) << "too far apart to be one surface";
+  model.follow_sensor = false;
+  NetworkSegmenter published(model, std::make_unique<CountsPixels>(seen));
+  static_cast<void>(published.segment(level_ring(32)));
+  EXPECT_EQ(seen, 32U) << "an image of fixed size is the published one";
+}
 
 TEST(NetworkSegmenter, UsesTheResolutionLevelThatIsSet) {
   NetworkSegmenter labels(describe(random_network(2, 32, 20)), std::make_unique<OneClass>(64U, 9));
