@@ -20,10 +20,11 @@ constexpr float turn = 4.0F;
 /// jump to the next ring: about 20 degrees.
 constexpr float max_step_back = turn * 20.0F / 360.0F;
 
-/// Grows with the azimuth from 0 at +x to 4, at a fraction of atan2's cost.
+/// Grows with the azimuth from 0 at +x to 4, at a fraction of atan2's cost. NAN of points without
+/// one, as those that were not measured.
 float diamond_angle(const Eigen::Vector3f& p) {
   const float norm = std::abs(p.x()) + std::abs(p.y());
-  if (!(norm > 0.0F) || !std::isfinite(norm)) return 0.0F;
+  if (!(norm > 0.0F) || !std::isfinite(norm)) return std::numeric_limits<float>::quiet_NaN();
   const float side = p.x() / norm;
   return p.y() >= 0.0F ? 1.0F - side : 3.0F + side;
 }
@@ -59,6 +60,10 @@ std::vector<float> unwrapped_azimuth(const Scan& scan) {
   float last = 0.0F;
   double sum = 0.0;
   for (float& entry : azimuth) {
+    if (std::isnan(entry)) {
+      entry = static_cast<float>(sum);
+      continue;
+    }
     const float angle = sense > 0.0F ? entry : turn - entry;
     float step = angle - last;
     if (step < -max_step_back) step += turn;
@@ -104,6 +109,7 @@ float median_of(std::vector<float>& values) {
   return *middle;
 }
 
+/// `slopes` and `rings` are of the points that were measured, in their order.
 StepsAtCuts steps_at_cuts(std::span<const float> slopes, std::span<const std::uint16_t> rings,
                           const SensorModel& sensor) {
   constexpr std::size_t points_on_each_side = 5;
@@ -195,12 +201,19 @@ std::vector<std::uint16_t> rings_from_elevation(const Scan& scan, const SensorMo
 }
 
 std::vector<std::uint16_t> rings_from_order(const Scan& scan, const SensorModel& sensor) {
-  const std::vector<float> azimuth = unwrapped_azimuth(scan);
   const std::vector<float> slopes = of_each_point<float>(scan, slope);
-  std::vector<std::uint16_t> from_front = cut_at(azimuth, 0.0F);
-  std::vector<std::uint16_t> from_back = cut_at(azimuth, turn / 2.0F);
-  const bool front_is_better =
-      is_seam(steps_at_cuts(slopes, from_front, sensor), steps_at_cuts(slopes, from_back, sensor));
+  const auto steps = [&](std::span<const std::uint16_t> rings) {
+    std::vector<float> measured_slopes;
+    std::vector<std::uint16_t> measured_rings;
+    for (std::size_t i = 0; i < slopes.size(); ++i) {
+      if (std::isnan(slopes[i])) continue;
+      measured_slopes.push_back(slopes[i]);
+      measured_rings.push_back(rings[i]);
+    }
+    return steps_at_cuts(measured_slopes, measured_rings, sensor);
+  };
+  auto [from_front, from_back] = turns_in_order(scan);
+  const bool front_is_better = is_seam(steps(from_front), steps(from_back));
   std::vector<std::uint16_t> rings = std::move(front_is_better ? from_front : from_back);
 
   // A scan loses whole rings to the sky, and a late point may open one too many.
@@ -209,6 +222,11 @@ std::vector<std::uint16_t> rings_from_order(const Scan& scan, const SensorModel&
   const auto last = static_cast<std::uint16_t>(sensor.rings - 1);
   for (auto& ring : rings) ring = std::min(ring, last);
   return rings;
+}
+
+std::array<std::vector<std::uint16_t>, 2> turns_in_order(const Scan& scan) {
+  const std::vector<float> azimuth = unwrapped_azimuth(scan);
+  return {cut_at(azimuth, 0.0F), cut_at(azimuth, turn / 2.0F)};
 }
 
 std::vector<std::uint16_t> assign_rings(const Scan& scan, const SensorModel& sensor) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -26,5 +27,10 @@ namespace stillmap {
 /// is not stored like that.
 [[nodiscard]] std::vector<std::uint16_t> rings_from_order(const Scan& scan,
                                                           const SensorModel& sensor);
+
+/// How often the azimuth has gone round at each point, as the scan is stored: the rings of a scan
+/// that is stored ring after ring, each once round from +x (the first), or from -x (the second).
+/// Points without an azimuth belong to the turn of those before them.
+[[nodiscard]] std::array<std::vector<std::uint16_t>, 2> turns_in_order(const Scan& scan);
 
 }  // namespace stillmap

@@ -7,12 +7,14 @@
 #include <functional>
 #include <iomanip>
 #include <numbers>
+#include <span>
 #include <sstream>
 #include <utility>
 #include <vector>
 
 #include "core/lidar/measured_elevation.hpp"
 #include "core/lidar/ring_numbering.hpp"
+#include "core/lidar/rings.hpp"
 
 namespace stillmap {
 namespace {
@@ -236,6 +238,75 @@ std::vector<double> shown_rings(const Scan& scan) {
   return elevations;
 }
 
+/// Whether a scan with these highest and lowest elevations may be an HDL-64E's, whose beams differ
+/// by half a degree from car to car, and in a compensated scan by more.
+bool is_field_of_hdl_64e(double high, double low) {
+  return high < 5.0 * degree && low < -20.0 * degree && low > -27.0 * degree;
+}
+
+/// Median elevation of each turn, and the share of points that lie nearer to it than half way to
+/// the next one. Nothing unless every turn has points and lies below the one before.
+struct OrderedRings {
+  std::vector<double> elevations;
+  double share_near = 0.0;
+};
+
+std::optional<OrderedRings> ordered_rings(const Scan& scan, std::span<const std::uint16_t> turns) {
+  constexpr std::size_t min_rings = 8, max_rings = 256;
+  const std::size_t count = turns.empty() ? 0 : std::size_t{turns.back()} + 1;
+  if (count < min_rings || count > max_rings) return std::nullopt;
+  std::vector<std::vector<double>> of_ring(count);
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const double elevation = measured_elevation(scan.points_lidar[i]);
+    if (std::isfinite(elevation)) of_ring[turns[i]].push_back(elevation);
+  }
+  // A few points beyond the seam open another turn.
+  if (of_ring.back().size() < min_points_on_ring) of_ring.pop_back();
+  OrderedRings rings;
+  std::size_t points = 0, near = 0;
+  for (std::vector<double>& values : of_ring) {
+    if (values.size() < min_points_on_ring) return std::nullopt;
+    const double middle = median_of(values);
+    if (!rings.elevations.empty() && middle >= rings.elevations.back() - min_elevation_step)
+      return std::nullopt;
+    rings.elevations.push_back(middle);
+  }
+  for (std::size_t k = 0; k < of_ring.size(); ++k) {
+    const std::size_t last = of_ring.size() - 1;
+    const double step =
+        std::min(k > 0 ? rings.elevations[k - 1] - rings.elevations[k] : INFINITY,
+                 k < last ? rings.elevations[k] - rings.elevations[k + 1] : INFINITY);
+    points += of_ring[k].size();
+    near += static_cast<std::size_t>(std::ranges::count_if(of_ring[k], [&](double elevation) {
+      return std::abs(elevation - rings.elevations[k]) < 0.5 * step;
+    }));
+  }
+  rings.share_near = static_cast<double>(near) / static_cast<double>(points);
+  return rings;
+}
+
+/// By rings that a scan stores one after the other, from the highest: those of a lidar whose beams
+/// start some centimetres apart, or of a scan that is compensated for its motion, are too wide to
+/// be shown.
+std::optional<SensorModel> fit_order(const Scan& scan) {
+  // Half of them where rings end elsewhere than they are cut.
+  constexpr double min_share_near = 0.6;
+  std::optional<OrderedRings> best;
+  for (const std::vector<std::uint16_t>& turns : turns_in_order(scan)) {
+    std::optional<OrderedRings> rings = ordered_rings(scan, turns);
+    if (rings && (!best || rings->share_near > best->share_near)) best = std::move(rings);
+  }
+  if (!best || best->share_near < min_share_near) return std::nullopt;
+  const std::vector<double>& elevations = best->elevations;
+  const int missing = hdl_64e().rings - static_cast<int>(elevations.size());
+  if (missing >= 0 && 4 * missing <= hdl_64e().rings &&
+      is_field_of_hdl_64e(elevations.front(), elevations.back()))
+    return hdl_64e();
+  std::optional<SensorModel> sensor = fit_beams(std::move(best->elevations));
+  if (sensor) sensor->ring_source = RingSource::order;
+  return sensor;
+}
+
 /// Elevations from all over the scan, sorted.
 std::vector<double> sorted_elevations(const Scan& scan) {
   std::vector<double> elevations;
@@ -262,7 +333,7 @@ std::optional<SensorModel> fit_bands(const Scan& scan) {
       std::abs(low + 15.0 * degree) < max_elevation_difference) {
     return vlp_16();
   }
-  if (high < 5.0 * degree && low < -20.0 * degree && low > -27.0 * degree) return hdl_64e();
+  if (is_field_of_hdl_64e(high, low)) return hdl_64e();
   if (high - low < 1.0 * degree) return std::nullopt;
   SensorModel sensor;
   sensor.name = "lidar without rings";
@@ -287,6 +358,7 @@ std::optional<SensorModel> fit_sensor(const Scan& scan) {
   }
   if (std::vector<double> rings = shown_rings(scan); !rings.empty())
     return fit_beams(std::move(rings));
+  if (auto sensor = fit_order(scan)) return sensor;
   return fit_bands(scan);
 }
 

@@ -10,12 +10,12 @@
 namespace stillmap {
 
 /// The sensor model that fits a scan: by the elevations of its rings, which a field numbers (unless
-/// a quarter of the points lie far from where it says) or which nearly all points lie close to;
-/// else by the field of view that it fills. A built-in sensor (VLP-16, HDL-32E, HDL-64E) where one
-/// fits within half a degree, though a quarter of its rings saw nothing, as those that look into
-/// the sky; else one made of the scan's own rings, or where it shows none (Livox, points moved to
-/// one time) of 40 bands between its lowest and highest points. Nothing when the scan has too few
-/// points.
+/// a quarter of the points lie far from where it says), which nearly all points lie close to, or
+/// which it stores one after the other, from the highest; else by the field of view that it fills.
+/// A built-in sensor (VLP-16, HDL-32E, HDL-64E) where one fits within half a degree, though a
+/// quarter of its rings saw nothing, as those that look into the sky; else one made of the scan's
+/// own rings, or where it shows none (Livox, points moved to one time) of 40 bands between its
+/// lowest and highest points. Nothing when the scan has too few points.
 [[nodiscard]] std::optional<SensorModel> fit_sensor(const Scan& scan);
 
 /// Why a scan cannot come from this sensor, in words: rings beyond the sensor's, or most points

@@ -75,6 +75,21 @@ TEST(RingsFromOrder, BearsDroppedPointsAndJitter) {
   EXPECT_LT(share_wrong(rings_from_order(ringed.scan, hdl_64e()), ringed.truth), 0.005);
 }
 
+TEST(RingsFromOrder, BearsPointsThatWereNotMeasured) {
+  for (const float instead : {0.0F, std::numeric_limits<float>::quiet_NaN()}) {
+    RingedScan ringed = ring_after_ring(hdl_64e(), {.start_azimuth = pi});
+    const auto is_measured = [](std::size_t i) { return i % 10 >= 3; };
+    for (std::size_t i = 0; i < ringed.scan.size(); ++i)
+      if (!is_measured(i)) ringed.scan.points_lidar[i].setConstant(instead);
+    const std::vector<std::uint16_t> rings = rings_from_order(ringed.scan, hdl_64e());
+    ASSERT_EQ(rings.size(), ringed.truth.size());
+    for (std::size_t i = 0; i < rings.size(); ++i) {
+      if (!is_measured(i)) continue;
+      ASSERT_EQ(rings[i], ringed.truth[i]) << i;
+    }
+  }
+}
+
 TEST(RingsFromOrder, KnowsEitherSenseAndEitherSeam) {
   for (const double sense : {1.0, -1.0}) {
     for (const double start : {0.0, pi}) {

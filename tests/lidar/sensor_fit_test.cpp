@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -108,6 +109,35 @@ TEST(FitSensor, FindsRingsThatAScanDoesNotNumber) {
       EXPECT_NEAR(fitted->beam_elevation(ring), sensor.beam_elevation(ring), 0.1 * degree) << ring;
   }
   EXPECT_EQ(fit_sensor(scan_of(hdl_32e(), false))->name, "HDL-32E");
+}
+
+TEST(FitSensor, TellsRingsByTheOrderOfPointsWhereBeamsStartApart) {
+  // Every fourth beam of KITTI's lidar, say: as high and low as all, and each as wide as a step.
+  SensorModel sensor = hdl_64e();
+  sensor.rings = 16;
+  for (std::size_t ring = 0; ring < 16; ++ring)
+    sensor.beam_elevations[ring] = hdl_64e().beam_elevations[4 * ring];
+  sensor.beam_elevations.resize(16);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> range_m(4.0, 50.0);
+  Scan scan;
+  for (int ring = 0; ring < sensor.rings; ++ring) {
+    for (int column = 0; column < 500; ++column) {
+      add_point(sensor.beam_elevation(ring), 0.01256 * column, range_m(random), scan);
+      scan.points_lidar.back().z() += ring < 8 ? 0.1F : -0.1F;
+      // What was not measured.
+      if (column % 7 == 0) scan.points_lidar.back().setZero();
+    }
+  }
+  const auto fitted = fit_sensor(scan);
+  ASSERT_TRUE(fitted);
+  EXPECT_EQ(fitted->pattern, ScanPattern::rings);
+  EXPECT_EQ(fitted->ring_source, RingSource::order);
+  ASSERT_EQ(fitted->rings, 16);
+  for (int ring = 0; ring < 16; ++ring)
+    EXPECT_NEAR(fitted->beam_elevation(ring), sensor.beam_elevation(ring), 0.5 * degree) << ring;
+  std::ranges::shuffle(scan.points_lidar, random);
+  EXPECT_EQ(fit_sensor(scan)->name, "HDL-64E") << "by its field of view, as without an order";
 }
 
 TEST(FitSensor, TakesNoPatternWithoutRingsForRings) {
