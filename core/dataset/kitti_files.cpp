@@ -1,10 +1,12 @@
 #include "core/dataset/kitti_files.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <fstream>
 #include <iomanip>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -168,17 +170,89 @@ void write_kitti_calibration(const std::filesystem::path& file,
   finish(out, file);
 }
 
-std::vector<std::int64_t> read_kitti_times_ns(const std::filesystem::path& file) {
+namespace {
+
+struct Unit {
+  TimesUnit unit;
+  std::int64_t to_a_second;
+};
+constexpr std::array<Unit, 3> smaller_units{{{TimesUnit::milliseconds, 1'000},
+                                             {TimesUnit::microseconds, 1'000'000},
+                                             {TimesUnit::nanoseconds, 1'000'000'000}}};
+constexpr std::int64_t ns_per_s = 1'000'000'000;
+
+/// Whether times as these, from scan to scan, are those of a lidar.
+bool is_period(double seconds) { return seconds >= 0.02 && seconds <= 2.0; }
+
+/// Median step from line to line; 0 of fewer than two.
+double median_step(std::span<const std::int64_t> times) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < times.size(); ++i)
+    steps.push_back(static_cast<double>(times[i]) - static_cast<double>(times[i - 1]));
+  if (steps.empty()) return 0.0;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::ranges::nth_element(steps, middle);
+  return *middle;
+}
+
+/// Whole numbers that are too large for seconds; nothing where one is none.
+std::optional<std::vector<std::int64_t>> whole_numbers(std::span<const std::string> lines) {
+  std::vector<std::int64_t> numbers;
+  for (const std::string& line : lines) {
+    const std::string_view text = without_blanks(line);
+    std::int64_t number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+    numbers.push_back(number);
+  }
+  return numbers;
+}
+
+std::optional<KittiTimes> large_times(std::span<const std::string> lines) {
+  std::optional<std::vector<std::int64_t>> numbers = whole_numbers(lines);
+  if (!numbers) return std::nullopt;
+  const double step = median_step(*numbers);
+  for (const auto [unit, to_a_second] : smaller_units) {
+    if (!is_period(step / static_cast<double>(to_a_second))) continue;
+    const std::int64_t ns = ns_per_s / to_a_second;
+    const std::int64_t largest = std::numeric_limits<std::int64_t>::max() / ns;
+    if (std::ranges::any_of(*numbers, [&](auto n) { return n > largest || n < -largest; }))
+      return std::nullopt;
+    for (std::int64_t& number : *numbers) number *= ns;
+    return KittiTimes{*std::move(numbers), unit};
+  }
+  return std::nullopt;
+}
+
+/// Of times that were taken for seconds.
+KittiTimes understood(std::vector<std::int64_t> times_ns) {
+  constexpr double longest_period_s = 40.0;
+  const double step_s = 1e-9 * median_step(times_ns);
+  // All alike, or in the other order: a single line tells nothing.
+  if (times_ns.size() > 1 && step_s <= 0.0) return {std::move(times_ns), TimesUnit::none};
+  if (step_s < longest_period_s) return {std::move(times_ns), TimesUnit::seconds};
+  for (const auto [unit, to_a_second] : smaller_units) {
+    if (!is_period(step_s / static_cast<double>(to_a_second))) continue;
+    for (std::int64_t& time_ns : times_ns) time_ns /= to_a_second;
+    return {std::move(times_ns), unit};
+  }
+  return {std::move(times_ns), TimesUnit::seconds};
+}
+
+}  // namespace
+
+KittiTimes read_kitti_times(const std::filesystem::path& file) {
   std::vector<std::int64_t> times_ns;
   const auto lines = lines_of(file);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const auto time_ns = ns_from_seconds(without_blanks(lines[i]));
     if (!time_ns) {
+      if (auto times = large_times(lines)) return *std::move(times);
       throw DatasetError(file, at_line(i) + " is not one time in seconds; is this times.txt?");
     }
     times_ns.push_back(*time_ns);
   }
-  return times_ns;
+  return understood(std::move(times_ns));
 }
 
 void write_kitti_times_ns(const std::filesystem::path& file,

@@ -31,8 +31,19 @@ void write_kitti_labels(const std::filesystem::path& file, std::span<const std::
 void write_kitti_calibration(const std::filesystem::path& file,
                              const Eigen::Isometry3d& T_camera_lidar);
 
-/// times.txt: seconds, one a line.
-[[nodiscard]] std::vector<std::int64_t> read_kitti_times_ns(const std::filesystem::path& file);
+/// What the numbers in a times.txt are: seconds in KITTI's, but users write what their drivers say.
+/// `none`: they do not grow from line to line, as where all are 0, and are no times of the scans.
+enum class TimesUnit : std::uint8_t { seconds, milliseconds, microseconds, nanoseconds, none };
+
+struct KittiTimes {
+  std::vector<std::int64_t> times_ns;
+  TimesUnit unit = TimesUnit::seconds;
+};
+
+/// times.txt, a number a line: seconds, unless scans would then be 40 s apart or more (the median),
+/// and 0.02 to 2 s by another unit. Throws DatasetError.
+[[nodiscard]] KittiTimes read_kitti_times(const std::filesystem::path& file);
+/// In seconds.
 void write_kitti_times_ns(const std::filesystem::path& file,
                           std::span<const std::int64_t> times_ns);
 

@@ -192,15 +192,17 @@ ScanDataset::ScanDataset(const fs::path& path, std::optional<LabelKind> label_ki
   }
   const fs::path times = sequence_ / "times.txt";
   if (!sequence_.empty() && fs::exists(times)) {
-    const auto times_ns = read_kitti_times_ns(times);
+    const auto [times_ns, unit] = read_kitti_times(times);
+    times_unit_ = unit;
     for (const std::size_t line : lines_in(times, lines_, times_ns.size(), files_)) {
       stamps_ns_.push_back(times_ns[line]);
     }
+  } else if (auto stamps_ns = stamps_from_names(files_)) {
+    stamps_ns_ = *std::move(stamps_ns);
   } else {
-    auto stamps_ns = stamps_from_names(files_);
-    has_made_up_stamps_ = !stamps_ns;
-    stamps_ns_ = stamps_ns ? *std::move(stamps_ns) : made_up_stamps(files_.size());
+    times_unit_ = TimesUnit::none;
   }
+  if (times_unit_ == TimesUnit::none) stamps_ns_ = made_up_stamps(files_.size());
   bin_layout_ = find_bin_layout();
   learn_from_sample();
 }
@@ -303,14 +305,33 @@ fs::path ScanDataset::beside(std::size_t i, const char* folder, const char* exte
   return sequence_ / folder / (file(i).stem().string() + extension);
 }
 
+std::string ScanDataset::remark_on_times() const {
+  const bool has_file = !sequence_.empty() && fs::exists(sequence_ / "times.txt");
+  switch (times_unit_) {
+    case TimesUnit::seconds:
+      return {};
+    case TimesUnit::milliseconds:
+      return "the numbers in times.txt are taken for milliseconds";
+    case TimesUnit::microseconds:
+      return "the numbers in times.txt are taken for microseconds";
+    case TimesUnit::nanoseconds:
+      return "the numbers in times.txt are taken for nanoseconds";
+    case TimesUnit::none:
+      break;
+  }
+  if (size() < 2) return {};
+  return (has_file ? "the times in times.txt do not grow from scan to scan"
+                   : "the names of the files tell no time (" + files_.front().filename().string() +
+                         ")") +
+         std::string(
+             ": ten scans a second are assumed, and samples of an IMU or a receiver beside "
+             "them do not fit to that");
+}
+
 std::vector<std::string> ScanDataset::remarks() const {
   std::vector<std::string> remarks;
   if (!format_.empty()) remarks.push_back("points have " + format_);
-  if (has_made_up_stamps_ && size() > 1) {
-    remarks.push_back("the names of the files tell no time (" + files_.front().filename().string() +
-                      "): ten scans a second are assumed, and samples of an IMU or a receiver "
-                      "beside them do not fit to that");
-  }
+  if (const std::string remark = remark_on_times(); !remark.empty()) remarks.push_back(remark);
   return remarks;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/dataset/bin_layout.hpp"
+#include "core/dataset/kitti_files.hpp"
 #include "core/dataset/kitti_lidar.hpp"
 #include "core/dataset/scan_source.hpp"
 #include "core/lidar/label_kind.hpp"
@@ -56,8 +57,8 @@ class ScanDataset {
   /// of a sequence. For scans of a source: the names that it gives them.
   [[nodiscard]] std::vector<std::filesystem::path> all_files() const;
 
-  /// From times.txt, else from the files' names (see stamp_ns_from_name()), else 0.1 s apart from
-  /// 0.
+  /// From times.txt (see read_kitti_times()), else from the files' names (see
+  /// stamp_ns_from_name()), else 0.1 s apart from 0.
   [[nodiscard]] std::int64_t stamp_ns(std::size_t i) const { return stamps_ns_.at(i); }
 
   /// Whether scans come with labels: any of some from all over the dataset that can be read. Labels
@@ -110,6 +111,8 @@ class ScanDataset {
   /// Takes scale, sensor and whether there are labels from them.
   void learn_from_sample();
   [[nodiscard]] std::optional<KittiLidar> find_kitti_lidar() const;
+  /// What was taken for granted of them; empty where that is nothing.
+  [[nodiscard]] std::string remark_on_times() const;
   /// Time between scans; 0.1 where the stamps say nothing [s].
   [[nodiscard]] double period_s() const;
 
@@ -125,7 +128,8 @@ class ScanDataset {
   PointFieldNames fields_;
   /// Of a typical scan.
   std::string format_;
-  bool has_made_up_stamps_ = false;
+  /// Of times.txt; `none` where stamps are made up.
+  TimesUnit times_unit_ = TimesUnit::seconds;
   LabelCensus label_census_;
   float intensity_scale_ = 1.0F;
   bool has_labels_ = false;

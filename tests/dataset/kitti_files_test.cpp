@@ -154,13 +154,46 @@ TEST(KittiTimes, RoundTripKeepsNanosecondsSince1970) {
   const ScratchFolder folder;
   const std::vector<std::int64_t> times_ns{0, 1, 103'735'900, 1'539'765'928'346'003'001, -5};
   write_kitti_times_ns(folder.path() / "times.txt", times_ns);
-  EXPECT_EQ(read_kitti_times_ns(folder.path() / "times.txt"), times_ns);
+  EXPECT_EQ(read_kitti_times(folder.path() / "times.txt").times_ns, times_ns);
+}
+
+TEST(KittiTimes, AreInTheUnitInWhichALidarGoesRound) {
+  const ScratchFolder folder;
+  const auto times_of = [&](const std::string& text) {
+    return read_kitti_times(folder.file("times.txt", text));
+  };
+  const std::vector<std::int64_t> from_zero{0, 100'000'000, 210'000'000};
+  const std::vector<std::pair<std::string, TimesUnit>> same_times{
+      {"0\n0.1\n0.21\n", TimesUnit::seconds},
+      {"0\n100\n210\n", TimesUnit::milliseconds},
+      {"0.0\n100.0\n210.0\n", TimesUnit::milliseconds},
+      {"0\n100000\n210000\n", TimesUnit::microseconds},
+      {"0\n100000000\n210000000\n", TimesUnit::nanoseconds}};
+  for (const auto& [text, unit] : same_times) {
+    const KittiTimes times = times_of(text);
+    EXPECT_EQ(times.unit, unit) << text;
+    EXPECT_EQ(times.times_ns, from_zero) << text;
+  }
+  const KittiTimes since_1970 = times_of("1539765928346003001\n1539765928446003001\n");
+  EXPECT_EQ(since_1970.unit, TimesUnit::nanoseconds);
+  EXPECT_EQ(since_1970.times_ns[0], 1'539'765'928'346'003'001);
+  EXPECT_EQ(times_of("1539765928346\n1539765928446\n").times_ns[1], 1'539'765'928'446'000'000);
+  EXPECT_EQ(times_of("0\n30\n60\n").unit, TimesUnit::seconds) << "of a scanner that is carried";
+  EXPECT_EQ(times_of("0\n3600\n7200\n").times_ns[1], 3'600'000'000'000) << "of no unit's lidar";
+  EXPECT_THROW((void)times_of("9223372036854775807\n7\n"), DatasetError);
+}
+
+TEST(KittiTimes, ThatDoNotGrowAreNone) {
+  const ScratchFolder folder;
+  for (const char* text : {"0\n0\n0\n", "3.0\n2.0\n1.0\n"})
+    EXPECT_EQ(read_kitti_times(folder.file("times.txt", text)).unit, TimesUnit::none) << text;
+  EXPECT_EQ(read_kitti_times(folder.file("times.txt", "0\n")).unit, TimesUnit::seconds);
 }
 
 TEST(KittiTimes, FaultsNameTheLine) {
   const ScratchFolder folder;
   const auto file = folder.file("times.txt", "0.0\n 1.0e-01 \r\nsoon\n");
-  EXPECT_THAT(message_of<DatasetError>([&] { (void)read_kitti_times_ns(file); }),
+  EXPECT_THAT(message_of<DatasetError>([&] { (void)read_kitti_times(file); }),
               AllOf(HasSubstr("times.txt"), HasSubstr("line 3")));
 }
 

@@ -37,7 +37,7 @@ void read(Kind kind, Bytes text) {
   if (kind == name) return read_name(text_of(text));
   const auto file = MemoryFolder::of_this_process().file("poses.txt", text);
   if (kind == poses) read_all_poses(file);
-  if (kind == times) static_cast<void>(read_kitti_times_ns(file));
+  if (kind == times) static_cast<void>(read_kitti_times(file));
   if (kind == calibration) {
     require(read_kitti_calibration(file).matrix().allFinite(), "a calibration is finite");
   }
