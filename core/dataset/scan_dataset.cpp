@@ -162,6 +162,19 @@ std::pair<double, double> field_of_view(const Scan& scan) {
   return {low, high};
 }
 
+/// Whether half of the points that were measured lie beyond 150 m: of a lidar in the open the
+/// median is some 10 m, and no more than 400 m can be measured at all.
+bool is_beyond_a_lidar(const Scan& scan) {
+  constexpr float longest_median_m = 150.0F;
+  std::size_t measured = 0, beyond = 0;
+  for (const Eigen::Vector3f& p : scan.points_lidar) {
+    if (!is_measured(p)) continue;
+    ++measured;
+    beyond += p.norm() > longest_median_m ? 1 : 0;
+  }
+  return 2 * beyond > measured;
+}
+
 SensorModel guess_sensor(const Scan& scan, bool kitti_file) {
   if (auto sensor = fit_sensor(scan)) {
     // KITTI's own, of which somebody has cut away the ground, say.
@@ -260,6 +273,7 @@ void ScanDataset::learn_from_sample() {
   std::ranges::sort(readable);
   DatasetFrame typical_frame = read_unscaled(readable[readable.size() / 2].second);
   const Scan& typical = typical_frame.scan;
+  is_too_large_ = is_beyond_a_lidar(typical);
   format_ = std::move(typical_frame.format);
   // The brightest but one of many: dark scans say too little, broken ones too much.
   std::ranges::sort(full_scales);
@@ -275,11 +289,10 @@ void ScanDataset::learn_from_sample() {
 }
 
 std::optional<KittiLidar> ScanDataset::find_kitti_lidar() const {
-  if (source_ || ending_of(files_.front()) != ".bin") return std::nullopt;
   std::vector<Scan> scans;
   for (const std::size_t i : sample()) {
     try {
-      scans.push_back(read_bin(file(i), bin_layout_));
+      scans.push_back(read_unscaled(i).scan);
     } catch (const DatasetError&) {
       // Whoever reads that scan is told.
       continue;
@@ -332,6 +345,10 @@ std::vector<std::string> ScanDataset::remarks() const {
   std::vector<std::string> remarks;
   if (!format_.empty()) remarks.push_back("points have " + format_);
   if (const std::string remark = remark_on_times(); !remark.empty()) remarks.push_back(remark);
+  if (is_too_large_)
+    remarks.push_back(
+        "half of the points lie more than 150 m away: coordinates are taken for "
+        "metres, and these may be centimetres or millimetres");
   return remarks;
 }
 

@@ -29,7 +29,7 @@ namespace stillmap {
 ///   "10");
 /// - a single such file;
 /// - any ScanSource, such as a bag's topic.
-/// Intensity is scaled to 0..1, by one factor for all that some of them decide. Files of KITTI's
+/// Intensity is scaled to 0..1, by one factor for all that some of them decide. Scans of KITTI's
 /// own lidar are corrected (see KittiLidar), unless they come with files of our own.
 class ScanDataset {
  public:
@@ -50,7 +50,7 @@ class ScanDataset {
 
   /// What was understood or taken for granted, in words: from which fields of a typical scan its
   /// intensity, times and rings are; that files without a stamp in their names follow each other
-  /// by 0.1 s. Empty where the format leaves nothing open.
+  /// by 0.1 s; that its coordinates can be no metres. Empty where nothing is open.
   [[nodiscard]] std::vector<std::string> remarks() const;
 
   /// Every file that it is read from: those of the scans, what lies beside them, and the text files
@@ -135,6 +135,8 @@ class ScanDataset {
   bool has_labels_ = false;
   bool lacks_labels_ = false;
   BinLayout bin_layout_ = BinLayout::kitti;
+  /// Half of the points of a typical scan lie farther away than any lidar sees.
+  bool is_too_large_ = false;
   SensorModel suggested_sensor_;
   std::optional<KittiLidar> kitti_lidar_;
 };
