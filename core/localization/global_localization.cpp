@@ -107,6 +107,7 @@ GlobalLocalization::Outcome GlobalLocalization::look_for(const Localizer& locali
   best_score_ = score(0);
   runner_up_score_ = score(1);
   if (result.status == LocalizationStatus::no_evidence) return Outcome::no_evidence;
+  result.status = judge_places(result.places, localizer.config(), regions.searched.has_value());
   if (result.status == LocalizationStatus::found)
     return take_found(result.places.front().T_map_lidar);
   if (result.status == LocalizationStatus::ambiguous && regions.expected) {
@@ -162,13 +163,17 @@ void GlobalLocalization::add_evidence(const Localizer& localizer, const Localiza
     if (known != places.end()) places.erase(known);
     const bool is_there = is_it(there);
     hypothesis.evidence.push_back(is_there ? there.evidence : PoseEvidence{});
-    if (is_there) hypothesis.T_map_odom = there.T_map_lidar * T_odom_lidar_.inverse();
+    // What was pinned is carried on by odometry where a scan may slide.
+    if (!is_there || (there.may_slide && !hypothesis.may_slide)) continue;
+    hypothesis.T_map_odom = there.T_map_lidar * T_odom_lidar_.inverse();
+    hypothesis.may_slide = there.may_slide;
   }
   // The scans before would have named them, had they been among the best there.
   for (const PlaceHypothesis& place : places) {
     std::vector<PoseEvidence> evidence(window_.size() - 1);
     evidence.push_back(place.evidence);
-    hypotheses_.push_back({place.T_map_lidar * T_odom_lidar_.inverse(), std::move(evidence)});
+    hypotheses_.push_back(
+        {place.T_map_lidar * T_odom_lidar_.inverse(), std::move(evidence), place.may_slide});
   }
   std::ranges::stable_sort(hypotheses_, [](const Hypothesis& a, const Hypothesis& b) {
     return mean_of(a.evidence).score() > mean_of(b.evidence).score();
@@ -179,7 +184,9 @@ void GlobalLocalization::add_evidence(const Localizer& localizer, const Localiza
 std::vector<PlaceHypothesis> GlobalLocalization::mean_places() const {
   std::vector<PlaceHypothesis> places;
   for (const Hypothesis& hypothesis : hypotheses_)
-    places.push_back({hypothesis.T_map_odom * T_odom_lidar_, mean_of(hypothesis.evidence), 0.0});
+    places.push_back({.T_map_lidar = hypothesis.T_map_odom * T_odom_lidar_,
+                      .evidence = mean_of(hypothesis.evidence),
+                      .may_slide = hypothesis.may_slide});
   return places;
 }
 
@@ -197,7 +204,7 @@ GlobalLocalization::Outcome GlobalLocalization::confirm(const Localizer& localiz
                                 config_.same_rad) &&
                       is_believed(there.evidence, limits);
   if (agrees) {
-    T_map_odom_ = there.T_map_lidar * T_odom_lidar_.inverse();
+    if (!there.may_slide) T_map_odom_ = there.T_map_lidar * T_odom_lidar_.inverse();
     return ++agreeing_scans_ < config_.confirming_scans ? Outcome::confirming : Outcome::confirmed;
   }
   if (++denying_scans_ < config_.contradicting_scans) return Outcome::confirming;

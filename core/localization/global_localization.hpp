@@ -84,6 +84,8 @@ class GlobalLocalization {
   struct Hypothesis {
     Eigen::Isometry3d T_map_odom = Eigen::Isometry3d::Identity();
     std::vector<PoseEvidence> evidence;
+    /// No scan of the window pins it.
+    bool may_slide = false;
   };
 
   void forget_evidence();

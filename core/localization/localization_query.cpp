@@ -128,11 +128,15 @@ LocalizationQuery::LocalizationQuery(const Scan& scan, const PointLabels& labels
   const auto collect = [&](const std::vector<std::uint32_t>& from, std::vector<FeaturePoint>& to) {
     for (const std::uint32_t i : from) {
       const SemanticClass label = labels.empty() ? SemanticClass::unlabeled : labels.classes[i];
-      if (!is_movable(label)) to.push_back({upright.points_lidar[i], label});
+      if (is_movable(label)) continue;
+      to.push_back({.position_lidar = upright.points_lidar[i],
+                    .label = label,
+                    .is_level = features.is_level[i]});
     }
   };
   collect(features.upright_points, features_upright.points);
   collect(features.level_points, features_upright.level_points);
+  collect(few_surfaces(upright, FeatureConfig{}, features), features_upright.surfaces);
   const auto ground = fit_ground(near_ground(features_upright));
   has_ground = ground.has_value();
   if (ground) T_foot_upright = foot_of(*ground);

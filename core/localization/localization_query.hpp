@@ -45,7 +45,8 @@ struct LocalizationQuery {
 
   /// A rotation.
   Eigen::Isometry3d T_upright_lidar = Eigen::Isometry3d::Identity();
-  /// For the alignment of points: on what stands up, and on level ground.
+  /// For the alignment of points: on what stands up, and on level ground; and what is registered on
+  /// the map's surfaces.
   FeatureSets features_upright;
   /// What stands up and cannot move by its label.
   std::vector<Eigen::Vector3f> landmarks_foot;

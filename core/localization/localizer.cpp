@@ -115,7 +115,17 @@ PlaceHypothesis Localizer::align_at(const LocalizationQuery& query,
   const MapSurroundings surroundings(points);
   const Eigen::Isometry3d T =
       surroundings.align(query, T_map_lidar * query.T_upright_lidar.inverse());
-  return {T * query.T_upright_lidar, surroundings.evidence(query, T), 0.0};
+  PlaceHypothesis by_points{T * query.T_upright_lidar, surroundings.evidence(query, T)};
+  if (by_points.evidence.score() < config_.min_registered_score) return by_points;
+  const auto on_surfaces = surroundings.align_surfaces(query, T);
+  if (!on_surfaces) return by_points;
+  const Eigen::Isometry3d& T_surfaces = on_surfaces->T_map_upright;
+  PlaceHypothesis place{.T_map_lidar = T_surfaces * query.T_upright_lidar,
+                        .evidence = surroundings.evidence(query, T_surfaces),
+                        .may_slide = on_surfaces->may_slide};
+  const bool is_worse =
+      place.evidence.score() < config_.min_kept_score * by_points.evidence.score();
+  return is_worse ? by_points : place;
 }
 
 bool is_believed(const PoseEvidence& evidence, const LocalizationConfig& config) {
@@ -125,13 +135,14 @@ bool is_believed(const PoseEvidence& evidence, const LocalizationConfig& config)
 }
 
 LocalizationStatus judge_places(std::span<const PlaceHypothesis> places,
-                                const LocalizationConfig& config) {
+                                const LocalizationConfig& config, bool is_guessed) {
   if (places.empty() || !is_believed(places.front().evidence, config))
     return LocalizationStatus::not_found;
   const double score = places.front().evidence.score();
   if (places.size() > 1 && places[1].evidence.score() > config.max_other_share * score)
     return LocalizationStatus::ambiguous;
-  return LocalizationStatus::found;
+  const bool may_slide = places.front().may_slide && !is_guessed;
+  return may_slide ? LocalizationStatus::ambiguous : LocalizationStatus::found;
 }
 
 bool is_other_place(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b,

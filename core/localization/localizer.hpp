@@ -18,7 +18,7 @@ namespace stillmap {
 enum class LocalizationStatus {
   /// One place fits, and no other nearly as well.
   found,
-  /// Several places fit.
+  /// Several places fit, or one that is not pinned: the scan fits some way on, too.
   ambiguous,
   /// No place fits.
   not_found,
@@ -36,6 +36,10 @@ struct LocalizationConfig {
   double min_confirmed = 0.8;
   double min_level = 0.6;
   double min_score = 0.48;
+  /// Poses are registered on the map's surfaces from this score on.
+  double min_registered_score = 0.3;
+  /// Surfaces that leave less than this share of the score have led astray.
+  double min_kept_score = 0.95;
   /// No other place reaches this share of its score.
   double max_other_share = 0.7;
   /// Another place is at least so far away, or turned [m, rad].
@@ -57,14 +61,18 @@ struct PlaceHypothesis {
   PoseEvidence evidence;
   /// Of the search, before registration.
   double search_score = 0.0;
+  /// What the scan shows does not pin it: it lies about as well some way on.
+  bool may_slide = false;
 };
 
 /// Whether two poses are of different places.
 [[nodiscard]] bool is_other_place(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b,
                                   const LocalizationConfig& config);
-/// What evidence says of places apart from one another, the best first.
+/// What evidence says of places apart from one another, the best first. `is_guessed`: somebody said
+/// where it is, which tells what the scan does not show.
 [[nodiscard]] LocalizationStatus judge_places(std::span<const PlaceHypothesis> places,
-                                              const LocalizationConfig& config);
+                                              const LocalizationConfig& config,
+                                              bool is_guessed = false);
 /// Whether a pose can be believed by its evidence alone, whatever other places there are.
 [[nodiscard]] bool is_believed(const PoseEvidence& evidence, const LocalizationConfig& config);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/odometry/faint_shifts.hpp"
 #include "core/odometry/point_alignment.hpp"
 
 namespace stillmap {
@@ -31,6 +32,28 @@ LocalMapConfig map_config() {
       .voxel_size_m = 1.0, .max_points_per_voxel = 32, .min_spacing_m = 0.15, .radius_m = 1000.0};
 }
 
+/// Surfaces move a pose that points found by less [m, rad].
+constexpr double max_way_m = 1.5;
+constexpr double max_way_rad = 0.1;
+
+OdometryConfig surface_config() {
+  OdometryConfig config;
+  config.weighting = Weighting::geometric;
+  config.registration.sweep_translation_m = 0.0;
+  config.registration.max_iterations = 30;
+  return config;
+}
+
+/// What shows the way along a smooth street is little, and farther off than the kernel at first.
+OdometryConfig wide_surface_config() {
+  OdometryConfig config = surface_config();
+  config.weighting = Weighting::none;
+  config.registration.robust_scale_m = 0.4;
+  config.registration.step_translation_m = 0.005;
+  config.registration.step_rotation_rad = 0.0005;
+  return config;
+}
+
 double share(int part, int whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
 }
@@ -45,8 +68,8 @@ bool is_expected(const LabelledPoint& point, float height_over_ground_m) {
 }  // namespace
 
 MapSurroundings::MapSurroundings(std::span<const LabelledPoint> points_map)
-    : points_map_(points_map), points_(map_config()) {
-  points_.insert(points_map);
+    : points_map_(points_map), map_(map_config()) {
+  map_.planes.insert(points_map);
 }
 
 Eigen::Isometry3d MapSurroundings::align(const LocalizationQuery& query,
@@ -54,8 +77,25 @@ Eigen::Isometry3d MapSurroundings::align(const LocalizationQuery& query,
   const PointAlignmentConfig rough{.max_distance_m = 1.0, .kernel_m = 0.5, .max_iterations = 15};
   const PointAlignmentConfig fine{.max_distance_m = 0.5, .kernel_m = 0.15, .max_iterations = 20};
   const Eigen::Isometry3d T =
-      align_points(query.features_upright, points_, T_map_upright, {}, rough).T_map_lidar;
-  return align_points(query.features_upright, points_, T, {}, fine).T_map_lidar;
+      align_points(query.features_upright, map_.planes, T_map_upright, {}, rough).T_map_lidar;
+  return align_points(query.features_upright, map_.planes, T, {}, fine).T_map_lidar;
+}
+
+std::optional<SurfacePose> MapSurroundings::align_surfaces(
+    const LocalizationQuery& query, const Eigen::Isometry3d& T_map_upright) const {
+  const OdometryConfig config = surface_config();
+  const OdometryResult wide =
+      register_features(query.features_upright, map_, T_map_upright, wide_surface_config());
+  if (wide.health == OdometryHealth::lost) return std::nullopt;
+  const OdometryResult found =
+      register_features(query.features_upright, map_, wide.T_map_lidar, config);
+  if (found.health == OdometryHealth::lost) return std::nullopt;
+  const Eigen::Isometry3d way = T_map_upright.inverse() * found.T_map_lidar;
+  if (way.translation().norm() > max_way_m || Eigen::AngleAxisd(way.linear()).angle() > max_way_rad)
+    return std::nullopt;
+  const OdometryResult judged =
+      doubted_where_shift_fits(found, query.features_upright, map_, config);
+  return SurfacePose{found.T_map_lidar, judged.health != OdometryHealth::good};
 }
 
 PoseEvidence MapSurroundings::evidence(const LocalizationQuery& query,
@@ -77,7 +117,7 @@ void MapSurroundings::ask_map(const LocalizationQuery& query, const Eigen::Isome
   for (const FeaturePoint& point : query.features_upright.points) {
     if (point.position_lidar.norm() > explained_range_m) continue;
     const bool is_explained =
-        points_.nearest(T * point.position_lidar, 1, max_distance_m).count > 0;
+        map_.planes.nearest(T * point.position_lidar, 1, max_distance_m).count > 0;
     const bool is_high =
         query.has_ground && (T_foot_upright * point.position_lidar).z() > max_traffic_height_m;
     ++evidence.scan_points;
@@ -98,8 +138,8 @@ std::pair<int, int> MapSurroundings::explained_by_one(
   std::pair<int, int> only(0, 0);
   for (const FeaturePoint& point : query.features_upright.points) {
     if (point.position_lidar.norm() > explained_range_m) continue;
-    const bool by_a = points_.nearest(T_a * point.position_lidar, 1, max_distance_m).count > 0;
-    const bool by_b = points_.nearest(T_b * point.position_lidar, 1, max_distance_m).count > 0;
+    const bool by_a = map_.planes.nearest(T_a * point.position_lidar, 1, max_distance_m).count > 0;
+    const bool by_b = map_.planes.nearest(T_b * point.position_lidar, 1, max_distance_m).count > 0;
     only.first += by_a && !by_b ? 1 : 0;
     only.second += by_b && !by_a ? 1 : 0;
   }
@@ -111,7 +151,7 @@ void MapSurroundings::ask_ground(const LocalizationQuery& query, const Eigen::Is
   int level = 0;
   for (const FeaturePoint& point : query.features_upright.level_points) {
     const Eigen::Vector3f p = T * point.position_lidar;
-    const Neighbours near = points_.nearest(p, 1, ground_search_m);
+    const Neighbours near = map_.planes.nearest(p, 1, ground_search_m);
     if (near.count == 0) continue;
     ++evidence.level_points;
     const float off_m = near.points[0].position_map.z() - p.z();

@@ -1,11 +1,12 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <optional>
 #include <span>
 #include <utility>
 
 #include "core/localization/localization_query.hpp"
-#include "core/odometry/feature_map.hpp"
+#include "core/odometry/registration.hpp"
 
 namespace stillmap {
 
@@ -28,6 +29,13 @@ struct PoseEvidence {
   [[nodiscard]] double score() const { return explained * confirmed; }
 };
 
+/// Where a scan lies on the map's surfaces.
+struct SurfacePose {
+  Eigen::Isometry3d T_map_upright = Eigen::Isometry3d::Identity();
+  /// It lies about as well some way on, in a direction that little of it shows.
+  bool may_slide = false;
+};
+
 /// The map round a pose, to register a scan in.
 class MapSurroundings {
  public:
@@ -36,6 +44,11 @@ class MapSurroundings {
   /// The pose that points align at, from a start near it; wherever they end where they do not.
   [[nodiscard]] Eigen::Isometry3d align(const LocalizationQuery& query,
                                         const Eigen::Isometry3d& T_map_upright) const;
+  /// The pose that the scan's points lie on the map's surfaces at, from where points aligned. Those
+  /// of two scans do not meet: on smooth walls the rings of a lidar lie best on those of the one
+  /// that mapped them, and draw it to where that was. Nothing where they lead away from the start.
+  [[nodiscard]] std::optional<SurfacePose> align_surfaces(
+      const LocalizationQuery& query, const Eigen::Isometry3d& T_map_upright) const;
   [[nodiscard]] PoseEvidence evidence(const LocalizationQuery& query,
                                       const Eigen::Isometry3d& T_map_upright) const;
   /// Points of the scan that the map explains at the one pose and not at the other, and the other
@@ -54,7 +67,8 @@ class MapSurroundings {
                 PoseEvidence& evidence) const;
 
   std::span<const LabelledPoint> points_map_;
-  FeatureMap points_;
+  /// As `planes` of it.
+  LocalMap map_;
 };
 
 }  // namespace stillmap

@@ -1,0 +1,157 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "core/lidar/shared_trajectory.hpp"
+#include "core/localization/localizer.hpp"
+#include "core/map/query/tile_reader.hpp"
+#include "core/map/static_map.hpp"
+
+namespace stillmap::test {
+namespace {
+
+constexpr double rad_per_deg = std::numbers::pi / 180.0;
+constexpr double street_length_m = 130.0;
+constexpr double wall_height_m = 12.0;
+constexpr double lidar_height_m = 1.9;
+
+struct House {
+  Eigen::Vector3d low, high;
+};
+
+/// A street between smooth fronts, which poles and the gaps between houses alone tell the way
+/// along; or without those, which nothing does.
+class SmoothStreet {
+ public:
+  explicit SmoothStreet(bool is_bare) {
+    add({-30.0, -30.0, -1.0}, {street_length_m + 30.0, 30.0, 0.0});
+    if (is_bare) {
+      add({-30.0, -12.0, 0.0}, {street_length_m + 30.0, -11.0, wall_height_m});
+      add({-30.0, 13.0, 0.0}, {street_length_m + 30.0, 14.0, wall_height_m});
+      return;
+    }
+    std::mt19937_64 random(5);
+    std::uniform_real_distribution<double> share(0.0, 1.0);
+    for (const double side : {-1.0, 1.0}) {
+      for (double x = -25.0 * share(random); x < street_length_m;) {
+        const double width_m = 18.0 + 24.0 * share(random);
+        const double face_m = side > 0.0 ? 13.0 : 11.0;
+        add({x, std::min(side * face_m, side * (face_m + 9.0)), 0.0},
+            {x + width_m, std::max(side * face_m, side * (face_m + 9.0)), wall_height_m});
+        x += width_m + 3.0 * share(random);
+      }
+      for (double x = 15.0 * share(random); x < street_length_m; x += 16.0 + 14.0 * share(random))
+        add({x, side * 8.5, 0.0}, {x + 0.15, side * 8.5 + 0.15, 6.0});
+    }
+  }
+
+  /// By 32 rings a degree apart, with noise.
+  [[nodiscard]] Scan scan_at(const Eigen::Isometry3d& T_map_lidar, std::int64_t stamp_ns) const {
+    std::mt19937_64 random(static_cast<std::uint64_t>(stamp_ns));
+    std::normal_distribution<double> noise_m(0.0, 0.015);
+    Scan scan;
+    scan.stamp_ns = stamp_ns;
+    for (int ring = 0; ring < 32; ++ring) {
+      const double elevation = (15.0 - ring) * rad_per_deg;
+      for (int k = 0; k < 900; ++k) {
+        const double azimuth = 0.4 * k * rad_per_deg;
+        const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
+                                  std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+        const double range_m = range(T_map_lidar.translation(), T_map_lidar.linear() * ray);
+        if (range_m > 100.0) continue;
+        scan.points_lidar.push_back(((range_m + noise_m(random)) * ray).cast<float>());
+        scan.ring.push_back(static_cast<std::uint16_t>(ring));
+      }
+    }
+    return scan;
+  }
+
+ private:
+  void add(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+    houses_.push_back({low, high});
+  }
+  [[nodiscard]] double range(const Eigen::Vector3d& from, const Eigen::Vector3d& ray) const {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const House& house : houses_) {
+      const Eigen::Array3d a = (house.low - from).array() / ray.array();
+      const Eigen::Array3d b = (house.high - from).array() / ray.array();
+      const double enter = a.min(b).maxCoeff();
+      const double leave = a.max(b).minCoeff();
+      if (enter > 0.0 && enter < leave) nearest = std::min(nearest, enter);
+    }
+    return nearest;
+  }
+
+  std::vector<House> houses_;
+};
+
+/// Off the axes, for rays that miss no plane.
+Eigen::Isometry3d pose(double x, double y, double heading_rad) {
+  return Eigen::Translation3d(x, y, lidar_height_m) *
+         Eigen::AngleAxisd(heading_rad, Eigen::Vector3d::UnitZ()) *
+         Eigen::AngleAxisd(0.003, Eigen::Vector3d::UnitX());
+}
+
+/// The map of a drive from one end to the other.
+std::shared_ptr<const PlaceIndex> index_of(const SmoothStreet& street) {
+  StaticMap map{StaticMapConfig{}};
+  map.reset(1);
+  SharedTrajectory path;
+  for (int k = 0; k < 90; ++k) {
+    LabelledScan scan;
+    const Eigen::Isometry3d T_map_lidar = pose(10.0 + 1.2 * k, 0.0, 0.002);
+    const std::int64_t stamp_ns = (k + 1) * 100'000'000LL;
+    scan.scan = street.scan_at(T_map_lidar, stamp_ns);
+    scan.motion.assign(scan.scan.size(), Motion::stationary);
+    map.insert(scan, T_map_lidar);
+    path.push_back({stamp_ns, T_map_lidar});
+  }
+  return std::make_shared<const PlaceIndex>(map.view(), path,
+                                            std::make_shared<TileReader>(nullptr));
+}
+
+/// The points of two scans do not meet, and the rings on a front lie best on those of the map.
+TEST(SmoothStreetPlaces, AreFoundWhereTheyAreAndNotWhereTheMapsRingsLie) {
+  const SmoothStreet street(false);
+  const Localizer localizer(index_of(street));
+  for (int k = 0; k < 8; ++k) {
+    const Eigen::Isometry3d T_map_lidar = pose(20.3 + 11.7 * k, 3.2, std::numbers::pi - 0.01);
+    const LocalizationQuery query(street.scan_at(T_map_lidar, 1000 + k), {},
+                                  Eigen::Matrix3d::Identity());
+    for (const double way_m : {-0.6, 0.6}) {
+      const PlaceHypothesis place =
+          localizer.align_at(query, Eigen::Translation3d(way_m, 0.0, 0.0) * T_map_lidar);
+      EXPECT_TRUE(is_believed(place.evidence, localizer.config()));
+      EXPECT_FALSE(place.may_slide);
+      const Eigen::Isometry3d off = T_map_lidar.inverse() * place.T_map_lidar;
+      EXPECT_LT(off.translation().norm(), 0.1) << k << " from " << way_m;
+    }
+  }
+}
+
+/// Somebody says where it is, so that no place a metre and a half on is looked at; how far along
+/// the street it is nothing shows.
+TEST(SmoothStreetPlaces, AreAmbiguousWhereNothingShowsTheWayAlong) {
+  const SmoothStreet street(true);
+  const Localizer localizer(index_of(street));
+  const Eigen::Isometry3d T_map_lidar = pose(62.4, 0.5, 0.01);
+  const LocalizationQuery query(street.scan_at(T_map_lidar, 1000), {}, Eigen::Matrix3d::Identity());
+  const LocalizationResult near =
+      localizer.localize(query, SearchRegion{.centre_map = T_map_lidar.translation().head<2>(),
+                                             .radius_m = 1.0,
+                                             .heading_rad = 0.0,
+                                             .max_turn_rad = 0.2});
+  ASSERT_FALSE(near.places.empty());
+  EXPECT_TRUE(is_believed(near.places.front().evidence, localizer.config()));
+  EXPECT_EQ(near.status, LocalizationStatus::ambiguous);
+  EXPECT_EQ(judge_places(near.places, localizer.config(), true), LocalizationStatus::found);
+}
+
+}  // namespace
+}  // namespace stillmap::test
