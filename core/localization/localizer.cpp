@@ -44,6 +44,19 @@ LocalizationResult Localizer::localize(const LocalizationQuery& query,
         align_at(query, T_map_upright(candidates[k], query, *index_) * query.T_upright_lidar);
     places[k].search_score = candidates[k].score;
   });
+  return judged(query, std::move(places));
+}
+
+LocalizationResult Localizer::localize_at(const LocalizationQuery& query,
+                                          std::span<const PlaceHypothesis> places) const {
+  std::vector<PlaceHypothesis> there(places.size());
+  tbb::parallel_for(std::size_t{0}, places.size(),
+                    [&](std::size_t k) { there[k] = align_at(query, places[k].T_map_lidar); });
+  return judged(query, std::move(there));
+}
+
+LocalizationResult Localizer::judged(const LocalizationQuery& query,
+                                     std::vector<PlaceHypothesis> places) const {
   std::ranges::stable_sort(places, [](const PlaceHypothesis& a, const PlaceHypothesis& b) {
     return a.evidence.score() > b.evidence.score();
   });

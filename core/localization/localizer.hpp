@@ -99,6 +99,9 @@ class Localizer {
   [[nodiscard]] LocalizationResult localize(
       const LocalizationQuery& query,
       const std::optional<SearchRegion>& region = std::nullopt) const;
+  /// The same, at places where the scan is known to be if anywhere: each is within a metre of one.
+  [[nodiscard]] LocalizationResult localize_at(const LocalizationQuery& query,
+                                               std::span<const PlaceHypothesis> places) const;
   /// Registers a scan at a pose within a metre of its own, and asks for evidence there.
   [[nodiscard]] PlaceHypothesis align_at(const LocalizationQuery& query,
                                          const Eigen::Isometry3d& T_map_lidar) const;
@@ -106,6 +109,9 @@ class Localizer {
   [[nodiscard]] const LocalizationConfig& config() const { return config_; }
 
  private:
+  /// Places that were registered, in any order.
+  [[nodiscard]] LocalizationResult judged(const LocalizationQuery& query,
+                                          std::vector<PlaceHypothesis> places) const;
   /// Where there are storeys: the same place on the others, too, whether or not the search found it
   /// there.
   void add_other_storeys(const LocalizationQuery& query,

@@ -106,7 +106,13 @@ StampedLocalization localize_lone_scan(const Localizer& localizer, const Scan& s
                                                as_measured.result.places.front().T_map_lidar);
   if (!T_start_end) return as_measured;
   const Scan at_stamp = deskew(scan, *T_start_end, sweep.duration_s);
-  return {localizer.localize(at_stamp, labels, R_body_lidar), SweepMotionSource::map};
+  const LocalizationQuery query(at_stamp, labels, R_body_lidar);
+  if (as_measured.result.status != LocalizationStatus::found)
+    return {localizer.localize(query), SweepMotionSource::map};
+  // What its motion was told at is where it is: it is not looked for elsewhere.
+  LocalizationResult there = localizer.localize_at(query, as_measured.result.places);
+  if (there.status == LocalizationStatus::not_found) return as_measured;
+  return {std::move(there), SweepMotionSource::map};
 }
 
 }  // namespace stillmap

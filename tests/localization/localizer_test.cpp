@@ -104,6 +104,20 @@ TEST(Localizer, PassesOverPosesThatAreNone) {
   expect_right(localize(localizer, scan), scan.T_map_lidar);
 }
 
+TEST(Localizer, FindsAScanAtPlacesThatAreKnownAndNowhereElse) {
+  const Localizer localizer(index_of(first_yard()));
+  const simulation::SimulatedScan scan = simulation::Simulation(yard(1, 1)).scan(95);
+  const LocalizationQuery query(drop_unusable_points(scan.scan, PrepareConfig{}), {},
+                                Eigen::Matrix3d::Identity());
+  std::vector<PlaceHypothesis> places(2);
+  places[0].T_map_lidar = Eigen::Translation3d(9.0, 0.0, 0.0) * scan.T_map_lidar;
+  places[1].T_map_lidar = Eigen::Translation3d(0.3, -0.4, 0.0) * scan.T_map_lidar;
+  expect_right(localizer.localize_at(query, places), scan.T_map_lidar);
+  places.pop_back();
+  EXPECT_NE(localizer.localize_at(query, places).status, LocalizationStatus::found);
+  EXPECT_NE(localizer.localize_at(query, {}).status, LocalizationStatus::found);
+}
+
 /// What 16 rings see of a hall of 70 by 40 m from its middle.
 Scan hall_scan(double lidar_height_m, double ceiling_height_m) {
   Scan scan;
