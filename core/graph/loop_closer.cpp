@@ -29,6 +29,7 @@ PoseEdge odometry_edge(std::size_t from, const Eigen::Isometry3d& T_from_to, dou
 }
 
 constexpr const char* stayed_alone = "no second closure agreed with its jump";
+constexpr const char* other_level = "it may be a level above or below: too little way agreed";
 
 Submap without_points(const Submap& submap) {
   return {.key_node = submap.key_node,
@@ -79,7 +80,10 @@ void LoopCloser::finish() {
     // Positions may have come, or been put elsewhere, after the last submap was closed.
     use_positions();
   }
-  for (Candidate& candidate : pending_) refuse(std::move(candidate), stayed_alone);
+  for (Candidate& candidate : pending_) {
+    const char* const why = leads_to_other_level(candidate) ? other_level : stayed_alone;
+    refuse(std::move(candidate), why);
+  }
   pending_.clear();
 }
 
@@ -140,10 +144,7 @@ void LoopCloser::find_loops(std::size_t to) {
       if (auto candidate = verify(from, to, ways_m[from])) judge(*std::move(candidate));
     }
   }
-  while (!pending_.empty() && pending_.front().to + config_.agreement_submaps <= to) {
-    refuse(std::move(pending_.front()), stayed_alone);
-    pending_.pop_front();
-  }
+  refuse_what_waits_too_long(to);
 }
 
 std::vector<std::size_t> LoopCloser::candidates(std::size_t to,
@@ -153,10 +154,11 @@ std::vector<std::size_t> LoopCloser::candidates(std::size_t to,
   for (std::size_t from = 0; from < to; ++from) {
     if (submaps_[to].submap.way_m - submaps_[from].submap.way_m < config_.min_way_between_m) break;
     if (submaps_[from].submap.points_submap.empty()) continue;
-    const double distance_m =
-        (T_map_submap(submaps_[from]).translation() - at_map).head<2>().norm();
+    const Eigen::Vector3d way = T_map_submap(submaps_[from]).translation() - at_map;
     const double reach_m = window_after(config_.drift, ways_m[from]).reach_m;
-    if (distance_m < config_.max_distance_m + reach_m) near.emplace_back(distance_m, from);
+    // Of storeys, that which is nearest in height.
+    if (way.head<2>().norm() < config_.max_distance_m + reach_m)
+      near.emplace_back(way.norm(), from);
   }
   std::ranges::sort(near);
   std::vector<std::size_t> chosen;
@@ -247,25 +249,56 @@ double LoopCloser::excursion_m(std::size_t from, std::size_t to) const {
 
 void LoopCloser::judge(Candidate candidate) {
   if (candidate.closure.jump_m <= config_.max_single_jump_m) return accept(std::move(candidate));
-  // Where the two would put the map's frame of the later place: the same for both.
-  const auto correction = [this](const Candidate& c) {
-    return graph_.T_map_node[c.edge.from] * c.edge.T_from_to *
-           graph_.T_map_node[c.edge.to].inverse();
-  };
+  const std::vector<std::size_t> agreeing = enough_agreeing(candidate);
+  if (agreeing.empty()) return pending_.push_back(std::move(candidate));
+  std::vector<Candidate> believed;
+  for (const std::size_t k : agreeing) believed.push_back(std::move(pending_[k]));
+  for (auto k = agreeing.rbegin(); k != agreeing.rend(); ++k)
+    pending_.erase(pending_.begin() + static_cast<std::ptrdiff_t>(*k));
+  for (Candidate& other : believed) accept(std::move(other));
+  accept(std::move(candidate));
+}
+
+bool LoopCloser::leads_to_other_level(const Candidate& candidate) const {
   const Eigen::Vector3d at_map = graph_.T_map_node[candidate.edge.to].translation();
-  const Eigen::Isometry3d mine = correction(candidate);
-  for (auto other = pending_.begin(); other != pending_.end(); ++other) {
-    if (other->to == candidate.to) continue;
-    const Eigen::Isometry3d theirs = correction(*other);
+  const double height_m = (correction_by(candidate) * at_map - at_map).z();
+  return std::abs(height_m) > config_.max_height_jump_m;
+}
+
+std::vector<std::size_t> LoopCloser::enough_agreeing(const Candidate& candidate) const {
+  const auto place = [this](const Candidate& c) -> Eigen::Vector3d {
+    return graph_.T_map_node[c.edge.to].translation();
+  };
+  const Eigen::Vector3d at_map = place(candidate);
+  const Eigen::Isometry3d mine = correction_by(candidate);
+  std::vector<std::size_t> agreeing;
+  double extent_m = 0.0;
+  for (std::size_t k = 0; k < pending_.size(); ++k) {
+    if (pending_[k].to == candidate.to) continue;
+    const Eigen::Isometry3d theirs = correction_by(pending_[k]);
     const double apart_m = (mine * at_map - theirs * at_map).norm();
     if (apart_m > config_.agreement_m || angle_of(mine.inverse() * theirs) > config_.agreement_rad)
       continue;
-    Candidate agreeing = std::move(*other);
-    pending_.erase(other);
-    accept(std::move(agreeing));
-    return accept(std::move(candidate));
+    agreeing.push_back(k);
+    extent_m = std::max(extent_m, (place(pending_[k]) - at_map).head<2>().norm());
   }
-  pending_.push_back(std::move(candidate));
+  if (agreeing.empty()) return {};
+  if (!leads_to_other_level(candidate)) return {agreeing.front()};
+  return extent_m >= config_.level_extent_m ? agreeing : std::vector<std::size_t>{};
+}
+
+void LoopCloser::refuse_what_waits_too_long(std::size_t to) {
+  for (auto candidate = pending_.begin(); candidate != pending_.end();) {
+    const bool is_other_level = leads_to_other_level(*candidate);
+    const std::size_t submaps =
+        is_other_level ? config_.level_agreement_submaps : config_.agreement_submaps;
+    if (candidate->to + submaps > to) {
+      ++candidate;
+      continue;
+    }
+    refuse(std::move(*candidate), is_other_level ? other_level : stayed_alone);
+    candidate = pending_.erase(candidate);
+  }
 }
 
 void LoopCloser::accept(Candidate candidate) {

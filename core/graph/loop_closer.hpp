@@ -43,6 +43,12 @@ struct LoopClosingConfig {
   double agreement_m = 0.6;
   double agreement_rad = 0.02;
   std::size_t agreement_submaps = 3;
+  /// A street that a bridge leads over, and the storeys of a car park, look alike: one that moves
+  /// the later place up or down by more than this needs closures that agree on so much of the plan,
+  /// which neither has, from one of so many next submaps [m].
+  double max_height_jump_m = 1.0;
+  double level_extent_m = 80.0;
+  std::size_t level_agreement_submaps = 8;
   /// Cauchy kernel, and the squared error (of six degrees of freedom) above which the graph denies
   /// a closure.
   double loop_scale = 2.5;
@@ -212,6 +218,15 @@ class LoopCloser {
   /// Whether the scan of this number is of this submap or one of its neighbours.
   [[nodiscard]] bool is_about(std::size_t number, std::size_t submap) const;
   void judge(Candidate candidate);
+  /// Where a closure would put the map's frame of the later place.
+  [[nodiscard]] Eigen::Isometry3d correction_by(const Candidate& candidate) const {
+    return graph_.T_map_node[candidate.edge.from] * candidate.edge.T_from_to *
+           graph_.T_map_node[candidate.edge.to].inverse();
+  }
+  [[nodiscard]] bool leads_to_other_level(const Candidate& candidate) const;
+  /// Those that wait and agree with it, by their places among them; nothing where they are too few.
+  [[nodiscard]] std::vector<std::size_t> enough_agreeing(const Candidate& candidate) const;
+  void refuse_what_waits_too_long(std::size_t to);
   void accept(Candidate candidate);
   /// Keeps a refusal for who asks, of what joins submaps.
   void refuse(Candidate candidate, const char* why);

@@ -73,6 +73,24 @@ TEST(LoopCloser, SecondRoundTakesTheDriftOut) {
             0.35 * rmse_m(two_rounds.odometry, two_rounds));
 }
 
+TEST(LoopCloser, AJumpInHeightNeedsMoreOfTheWay) {
+  const StreetWorld world(11);
+  // 1.9 m lower after the first round.
+  const double height_drift_m = 0.006;
+  const Drive short_return = drive(world, 1.2 * StreetWorld::length_m, 0.0, height_drift_m);
+  const LoopCloser waits = closed(world, short_return, 100);
+  EXPECT_TRUE(waits.closures().empty());
+  EXPECT_FALSE(waits.refused().empty());
+  const Drive long_return = drive(world, 1.5 * StreetWorld::length_m, 0.0, height_drift_m);
+  const LoopCloser closer = closed(world, long_return, 100);
+  EXPECT_GE(closer.closures().size(), 4U);
+  for (const LoopClosure& closure : closer.closures()) {
+    const Eigen::Isometry3d T_from_to =
+        long_return.truth[closure.from_scan].inverse() * long_return.truth[closure.to_scan];
+    EXPECT_LT((T_from_to.inverse() * closure.T_from_to).translation().norm(), 0.15);
+  }
+}
+
 TEST(LoopCloser, NothingJoinsPlacesOfWhichThatIsDenied) {
   const StreetWorld world(11);
   const Drive two_rounds = drive(world, 1.5 * StreetWorld::length_m, 0.0001, 0.003);
