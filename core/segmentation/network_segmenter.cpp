@@ -192,7 +192,10 @@ PointLabels NetworkSegmenter::segment_with(SegmentationNetwork& network, int col
   const PixelLabels pixels = pixel_labels(std::move(outputs), model_);
   PointLabels labels =
       model_.knn ? knn_labels(image, pixels, *model_.knn) : labels_of_own_pixel(image, pixels);
-  if (model_.voxel_votes) vote_in_voxels(points, *model_.voxel_votes, labels);
+  if (model_.voxel_votes) {
+    vote_in_voxels(points, *model_.voxel_votes, labels);
+    vote_where_unsure(points, {}, labels);
+  }
   return labels;
 }
 

@@ -66,12 +66,15 @@ void sort_by_voxel(std::vector<VoxelAndPoint>& words) {
   }
 }
 
-std::vector<VoxelAndPoint> voters_by_voxel(std::span<const Eigen::Vector3f> points_lidar,
-                                           const VoxelVoteConfig& config,
-                                           const PointLabels& labels) {
-  const auto per_edge = static_cast<float>(1.0 / config.edge_m);
-  const auto per_height = static_cast<float>(1.0 / config.height_m);
-  const Eigen::Array3f scale(per_edge, per_edge, per_height);
+/// What turns metres into voxels.
+Eigen::Array3f voxels_per_m(double edge_m, double height_m) {
+  const auto per_edge = static_cast<float>(1.0 / edge_m);
+  return {per_edge, per_edge, static_cast<float>(1.0 / height_m)};
+}
+
+/// Every point that has a class and a voxel, with that, in the order of the points.
+std::vector<VoxelAndPoint> find_voters(std::span<const Eigen::Vector3f> points_lidar,
+                                       const Eigen::Array3f& scale, const PointLabels& labels) {
   std::vector<VoxelAndPoint> voters;
   voters.reserve(points_lidar.size());
   for (std::size_t i = 0; i < points_lidar.size(); ++i) {
@@ -81,11 +84,16 @@ std::vector<VoxelAndPoint> voters_by_voxel(std::span<const Eigen::Vector3f> poin
       voters.push_back(number << point_bits | i);
     }
   }
-  sort_by_voxel(voters);
   return voters;
 }
 
 using VotesOfClasses = std::array<float, semantic_class_count>;
+
+VotesOfClasses equal_weights() {
+  VotesOfClasses weights;
+  weights.fill(1.0F);
+  return weights;
+}
 
 struct Tally {
   std::uint8_t label;
@@ -95,7 +103,8 @@ struct Tally {
 /// The voxels in which points voted, in ascending order of their numbers.
 class VotingVoxels {
  public:
-  VotingVoxels(const std::vector<VoxelAndPoint>& voters, const PointLabels& labels) {
+  VotingVoxels(const std::vector<VoxelAndPoint>& voters, const PointLabels& labels,
+               const VotesOfClasses& weights) {
     VotesOfClasses votes{};
     for (std::size_t begin = 0; begin < voters.size();) {
       const VoxelNumber number = voters[begin] >> point_bits;
@@ -109,7 +118,7 @@ class VotingVoxels {
       }
       for (; seen != 0; seen &= seen - 1) {
         const auto label = static_cast<std::uint8_t>(std::countr_zero(seen));
-        tallies_.push_back({label, votes[label]});
+        tallies_.push_back({label, weights[label] * votes[label]});
         votes[label] = 0.0F;
       }
     }
@@ -205,6 +214,65 @@ void decide(const VotesAround& votes, double own_weight, std::size_t point, Poin
   labels.confidence[point] = *most / votes.voters;
 }
 
+constexpr std::array small_things{SemanticClass::bicycle, SemanticClass::motorcycle,
+                                  SemanticClass::person, SemanticClass::bicyclist,
+                                  SemanticClass::motorcyclist};
+
+/// Of each class: its weight, and the confidence that leaves no doubt.
+struct SecondVote {
+  VotesOfClasses weights = equal_weights();
+  VotesOfClasses sure_from;
+
+  explicit SecondVote(const UnsureVoteConfig& config) {
+    sure_from.fill(static_cast<float>(config.unsure_below));
+    for (const SemanticClass thing : small_things) {
+      weights[static_cast<std::size_t>(thing)] = static_cast<float>(config.small_weight);
+      sure_from[static_cast<std::size_t>(thing)] = static_cast<float>(config.unsure_small_below);
+    }
+  }
+
+  [[nodiscard]] bool is_unsure(const PointLabels& labels, std::size_t point) const {
+    return labels.confidence[point] < sure_from[static_cast<std::size_t>(labels.classes[point])];
+  }
+
+  void decide(const VotesAround& votes, std::size_t point, PointLabels& labels) const {
+    const auto most = std::ranges::max_element(votes.of_class);
+    if (!(*most > votes.of_class[static_cast<std::size_t>(labels.classes[point])])) return;
+    const auto winner = static_cast<std::size_t>(most - votes.of_class.begin());
+    labels.classes[point] = static_cast<SemanticClass>(winner);
+    labels.confidence[point] = *most / weights[winner] / votes.voters;
+  }
+};
+
+/// Columns of voxels near which somebody is unsure. Columns 256 edges apart share a mark: a
+/// needless one costs time only.
+class MarkedColumns {
+ public:
+  void mark_around(VoxelNumber number) {
+    for (const VoxelNumber step : {VoxelNumber{0}, x_step, -x_step, y_step, -y_step})
+      marks_[place(number + step)] = true;
+  }
+  [[nodiscard]] bool has(VoxelNumber number) const { return marks_[place(number)]; }
+
+ private:
+  static constexpr VoxelNumber wrap = 256;
+  static std::size_t place(VoxelNumber number) {
+    return number / x_step % wrap * wrap + number / y_step % wrap;
+  }
+
+  std::vector<bool> marks_ = std::vector<bool>(wrap * wrap);
+};
+
+/// Leaves those who can vote for an unsure point: sorting all takes most of the time.
+void keep_around_unsure(std::vector<VoxelAndPoint>& voters, const SecondVote& second,
+                        const PointLabels& labels) {
+  MarkedColumns columns;
+  for (const VoxelAndPoint voter : voters) {
+    if (second.is_unsure(labels, voter & point_mask)) columns.mark_around(voter >> point_bits);
+  }
+  std::erase_if(voters, [&](VoxelAndPoint voter) { return !columns.has(voter >> point_bits); });
+}
+
 std::string not_above_zero(const char* name, double value) {
   if (value > 0.0 && std::isfinite(value)) return {};
   std::ostringstream fault;
@@ -226,13 +294,22 @@ std::string VoxelVoteConfig::faults() const {
          no_share("neighbour_weight", neighbour_weight) + no_share("own_weight", own_weight);
 }
 
+std::string UnsureVoteConfig::faults() const {
+  return not_above_zero("edge_m", edge_m) + not_above_zero("height_m", height_m) +
+         not_above_zero("small_weight", small_weight) +
+         no_share("neighbour_weight", neighbour_weight) + no_share("unsure_below", unsure_below) +
+         no_share("unsure_small_below", unsure_small_below);
+}
+
 void vote_in_voxels(std::span<const Eigen::Vector3f> points_lidar, const VoxelVoteConfig& config,
                     PointLabels& labels) {
   assert(config.faults().empty());
   assert(labels.classes.size() == points_lidar.size());
   if (points_lidar.size() > point_mask) return;
-  const std::vector<VoxelAndPoint> voters = voters_by_voxel(points_lidar, config, labels);
-  const VotingVoxels voxels(voters, labels);
+  std::vector<VoxelAndPoint> voters =
+      find_voters(points_lidar, voxels_per_m(config.edge_m, config.height_m), labels);
+  sort_by_voxel(voters);
+  const VotingVoxels voxels(voters, labels, equal_weights());
   const tbb::blocked_range<std::size_t> all(0, voxels.numbers().size(), 2048);
   tbb::parallel_for(all, [&](const auto& some) {
     Neighbourhoods neighbourhoods(voxels, some.begin(), config.neighbour_weight);
@@ -242,6 +319,34 @@ void vote_in_voxels(std::span<const Eigen::Vector3f> points_lidar, const VoxelVo
       for (std::size_t voter = voxels.first_voter(voxel); voter < end; ++voter) {
         decide(votes, config.own_weight, voters[voter] & point_mask, labels);
       }
+    }
+  });
+}
+
+void vote_where_unsure(std::span<const Eigen::Vector3f> points_lidar,
+                       const UnsureVoteConfig& config, PointLabels& labels) {
+  assert(config.faults().empty());
+  assert(labels.classes.size() == points_lidar.size());
+  if (points_lidar.size() > point_mask) return;
+  const SecondVote second(config);
+  std::vector<VoxelAndPoint> voters =
+      find_voters(points_lidar, voxels_per_m(config.edge_m, config.height_m), labels);
+  keep_around_unsure(voters, second, labels);
+  sort_by_voxel(voters);
+  const VotingVoxels voxels(voters, labels, second.weights);
+  const tbb::blocked_range<std::size_t> all(0, voxels.numbers().size(), 2048);
+  tbb::parallel_for(all, [&](const auto& some) {
+    Neighbourhoods neighbourhoods(voxels, some.begin(), config.neighbour_weight);
+    std::vector<std::size_t> unsure;
+    for (std::size_t voxel = some.begin(); voxel < some.end(); ++voxel) {
+      unsure.clear();
+      for (std::size_t k = voxels.first_voter(voxel); k < voxels.first_voter(voxel + 1); ++k) {
+        const std::size_t point = voters[k] & point_mask;
+        if (second.is_unsure(labels, point)) unsure.push_back(point);
+      }
+      if (unsure.empty()) continue;
+      const VotesAround votes = neighbourhoods.around(voxel);
+      for (const std::size_t point : unsure) second.decide(votes, point, labels);
     }
   });
 }

@@ -35,4 +35,30 @@ struct VoxelVoteConfig {
 void vote_in_voxels(std::span<const Eigen::Vector3f> points_lidar, const VoxelVoteConfig& config,
                     PointLabels& labels);
 
+/// A second vote, in larger voxels, of the points that the votes before left unsure. Networks doubt
+/// more among real things than among the simulated ones that they have learnt from, and find more
+/// people, bicycles and motorcycles there than there are.
+struct UnsureVoteConfig {
+  /// As VoxelVoteConfig's.
+  double edge_m = 0.5;
+  double height_m = 0.25;
+  double neighbour_weight = 0.5;
+  /// Points of a confidence below it vote again for themselves, and those of small things below
+  /// the second one.
+  double unsure_below = 0.35;
+  double unsure_small_below = 0.5;
+  /// What a vote for a small thing counts.
+  double small_weight = 0.4;
+
+  /// Every fault in words, one a line; empty when the configuration can be used.
+  [[nodiscard]] std::string faults() const;
+};
+
+/// Every unsure point takes the class that has most votes in its voxel and those around it, as in
+/// vote_in_voxels(): its own one of several, else the lowest. The others vote and stay as they are.
+/// The confidence of a point that changes its class is the share that it has after
+/// vote_in_voxels().
+void vote_where_unsure(std::span<const Eigen::Vector3f> points_lidar,
+                       const UnsureVoteConfig& config, PointLabels& labels);
+
 }  // namespace stillmap

@@ -101,5 +101,21 @@ void votes_in_voxels(benchmark::State& state) {
 }
 BENCHMARK(votes_in_voxels)->Unit(benchmark::kMillisecond)->UseRealTime();
 
+void votes_where_unsure(benchmark::State& state) {
+  const Scan scan = cli::benchmark_scan();
+  PointLabels labels;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    labels.classes.push_back(static_cast<SemanticClass>(1 + i / 37 % 19));
+    // As many as in real scans, in stretches as there.
+    labels.confidence.push_back(i / 400 % 14 == 0 ? 0.3F : 0.8F);
+  }
+  for (auto _ : state) {
+    PointLabels voted = labels;
+    vote_where_unsure(scan.points_lidar, {}, voted);
+    benchmark::DoNotOptimize(voted);
+  }
+}
+BENCHMARK(votes_where_unsure)->Unit(benchmark::kMillisecond)->UseRealTime();
+
 }  // namespace
 }  // namespace stillmap

@@ -113,12 +113,17 @@ TEST(NetworkSegmenter, LetsTheNeighboursVoteWhenAsked) {
 TEST(NetworkSegmenter, LetsVoxelsVoteAfterTheImageWhenAsked) {
   Fixture fixture;
   fixture.model.knn = KnnConfig{};
-  const Scan scan = random_scan(600, 4);
+  Scan scan = random_scan(600, 4);
+  // So near that points share voxels.
+  for (Eigen::Vector3f& point : scan.points_lidar) point *= 0.1F;
   const PointLabels before = open_model(fixture.model)->segment(scan);
-  fixture.model.voxel_votes = VoxelVoteConfig{.edge_m = 2.0, .height_m = 2.0};
+  fixture.model.voxel_votes = VoxelVoteConfig{.edge_m = 0.2, .height_m = 0.2};
   const PointLabels voted = open_model(fixture.model)->segment(scan);
   PointLabels expected = before;
   vote_in_voxels(scan.points_lidar, *fixture.model.voxel_votes, expected);
+  const PointLabels once = expected;
+  vote_where_unsure(scan.points_lidar, {}, expected);
+  EXPECT_NE(expected.classes, once.classes);
   EXPECT_EQ(voted.classes, expected.classes);
   EXPECT_EQ(voted.confidence, expected.confidence);
   EXPECT_NE(voted.classes, before.classes);

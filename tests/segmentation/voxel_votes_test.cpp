@@ -205,5 +205,101 @@ TEST(VoxelVotes, NameWhatIsWrongWithTheirConfiguration) {
             "neighbour_weight = -1; must be 0..1\nown_weight = 2; must be 0..1\n");
 }
 
+constexpr std::array small_things{SemanticClass::bicycle, SemanticClass::motorcycle,
+                                  SemanticClass::person, SemanticClass::bicyclist,
+                                  SemanticClass::motorcyclist};
+
+bool is_small(SemanticClass label) {
+  return std::ranges::find(small_things, label) != small_things.end();
+}
+
+// Votes for small things count less: to the reference they come with so much less confidence.
+void expect_unsure_like_reference(const RandomCloud& cloud, const UnsureVoteConfig& config) {
+  PointLabels weighted = cloud.labels;
+  for (std::size_t i = 0; i < weighted.classes.size(); ++i) {
+    if (is_small(weighted.classes[i]))
+      weighted.confidence[i] *= static_cast<float>(config.small_weight);
+  }
+  const Reference reference(cloud.points,
+                            {.edge_m = config.edge_m,
+                             .height_m = config.height_m,
+                             .neighbour_weight = config.neighbour_weight},
+                            weighted);
+  PointLabels voted = cloud.labels;
+  vote_where_unsure(cloud.points, config, voted);
+  std::size_t changed = 0;
+  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    const SemanticClass before = cloud.labels.classes[i];
+    const double sure_from = is_small(before) ? config.unsure_small_below : config.unsure_below;
+    if (before == SemanticClass::unlabeled ||
+        static_cast<double>(cloud.labels.confidence[i]) >= sure_from) {
+      EXPECT_EQ(voted.classes[i], before);
+      EXPECT_EQ(voted.confidence[i], cloud.labels.confidence[i]);
+      continue;
+    }
+    const Ballot ballot = reference.around(cloud.points[i]);
+    std::array<double, semantic_class_count> order = ballot.votes;
+    std::ranges::sort(order, std::greater<>());
+    if (order[0] - order[1] < 1e-5 * order[0]) continue;
+    const auto winner =
+        static_cast<std::size_t>(std::ranges::max_element(ballot.votes) - ballot.votes.begin());
+    EXPECT_EQ(static_cast<std::size_t>(voted.classes[i]), winner) << "point " << i;
+    if (voted.classes[i] == before) continue;
+    const double weight = is_small(voted.classes[i]) ? config.small_weight : 1.0;
+    EXPECT_NEAR(voted.confidence[i], ballot.votes[winner] / weight / ballot.voters, 1e-5);
+    ++changed;
+  }
+  EXPECT_GT(changed, cloud.points.size() / 20);
+}
+
+TEST(UnsureVotes, AreThoseOfTheReference) {
+  for (unsigned seed = 0; seed < 5; ++seed) {
+    expect_unsure_like_reference(RandomCloud(seed, 3000, 3.0F), {});
+    // Further than marks of columns reach before they wrap.
+    expect_unsure_like_reference(RandomCloud(seed, 20'000, 40.0F),
+                                 {.edge_m = 0.25, .height_m = 4.0, .unsure_below = 0.9});
+    expect_unsure_like_reference(RandomCloud(seed, 3000, 3.0F),
+                                 {.neighbour_weight = 0.0, .small_weight = 1.0});
+  }
+}
+
+TEST(UnsureVotes, TakeAPoleFoundAsAPersonFromThere) {
+  std::vector<Eigen::Vector3f> points;
+  PointLabels labels;
+  const auto add = [&](float z, SemanticClass label, float confidence) {
+    points.emplace_back(5.0F, 3.0F, z);
+    labels.classes.push_back(label);
+    labels.confidence.push_back(confidence);
+  };
+  for (int i = 0; i < 6; ++i) add(0.05F * static_cast<float>(i), SemanticClass::person, 0.45F);
+  for (int i = 6; i < 10; ++i) add(0.05F * static_cast<float>(i), SemanticClass::pole, 0.8F);
+  PointLabels sure = labels;
+  std::fill_n(sure.confidence.begin(), 6, 0.55F);
+  const std::vector<SemanticClass> before = labels.classes;
+  vote_where_unsure(points, {}, labels);
+  EXPECT_EQ(labels.classes, std::vector(10, SemanticClass::pole));
+  vote_where_unsure(points, {}, sure);
+  EXPECT_EQ(sure.classes, before);
+}
+
+TEST(UnsureVotes, LeaveAPointAloneAndOneThatLiesNowhere) {
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<Eigen::Vector3f> points{{5, 5, 0}, {9, 5, 0}, {nan, 5, 0}};
+  PointLabels labels{.classes = {SemanticClass::person, SemanticClass::road, SemanticClass::car},
+                     .confidence = {0.1F, 1.0F, 0.1F}};
+  const PointLabels before = labels;
+  vote_where_unsure(points, {}, labels);
+  EXPECT_EQ(labels.classes, before.classes);
+  EXPECT_EQ(labels.confidence, before.confidence);
+}
+
+TEST(UnsureVotes, NameFaults) {
+  EXPECT_EQ(UnsureVoteConfig{}.faults(), "");
+  const UnsureVoteConfig wrong{.edge_m = 0, .unsure_below = 2, .small_weight = 0};
+  EXPECT_NE(wrong.faults().find("edge_m"), std::string::npos);
+  EXPECT_NE(wrong.faults().find("unsure_below"), std::string::npos);
+  EXPECT_NE(wrong.faults().find("small_weight"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace stillmap

@@ -148,7 +148,9 @@ SegmentationTiming time_segmentation(const ModelDescription& model, const TimedE
   const KnnConfig knn = model.knn.value_or(KnnConfig{});
   timing.votes_ms = median_ms([&] {
     PointLabels labels = knn_labels(image, pixels, knn);
-    if (model.voxel_votes) vote_in_voxels(scan.points_lidar, *model.voxel_votes, labels);
+    if (!model.voxel_votes) return;
+    vote_in_voxels(scan.points_lidar, *model.voxel_votes, labels);
+    vote_where_unsure(scan.points_lidar, {}, labels);
   });
   return timing;
 }
