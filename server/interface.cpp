@@ -39,8 +39,8 @@ Interface::Interface(const ServerConfig& config, const InterfaceContext& context
           traits(config, context), context.storage.latest_map(), context.statistics,
           [this] { return diagnostics(); }, [this] { return no_input_reason(); }) {
   start_receivers(config, context);
-  services_.emplace(context.participant, config.topics.name_space,
-                    service_context(config, context));
+  services_.emplace(context.participant, config.topics.name_space, service_context(config, context),
+                    [this] { return discovery_diagnostics_.namesake_refusal(); });
   status_publisher_.emplace(context.participant, context.topics, config.publish.status_period_s,
                             [this] { return status(); });
 }

@@ -96,11 +96,14 @@ Diagnostics server_diagnostics(const DiscoveredServer& server) {
     for (const dds::RemoteParticipant& participant : server.participants) {
       list.append(list.empty() ? "" : "; ").append(describe(participant));
     }
-    diagnostics.push_back({.severity = dds::Severity::problem,
-                           .what = std::to_string(server.participants.size()) +
-                                   " servers are called '" + server.name_space + "'",
-                           .evidence = list + ": both map the same scans, and either may answer",
-                           .hint = "stop one, or give it another topics.namespace or domain"});
+    diagnostics.push_back(
+        {.severity = dds::Severity::problem,
+         .what = std::to_string(server.participants.size()) + " servers are called '" +
+                 server.name_space + "'",
+         .evidence =
+             list +
+             ": both map the same scans, either may answer, and neither saves, loads or resets",
+         .hint = "stop one, or give it another topics.namespace or domain"});
   }
   if (!server.status) {
     diagnostics.push_back({.severity = dds::Severity::problem,

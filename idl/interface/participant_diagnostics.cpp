@@ -226,7 +226,8 @@ std::vector<Diagnostic> namesake_diagnostics(const std::string& name_space,
         {.severity = Severity::problem,
          .what = std::string(namesake_words) + "'" + name_space + "' (" +
                  describe_location(server) + ")",
-         .evidence = "both map the same scans, and either may answer, save or reset",
+         .evidence =
+             "both map the same scans, either may answer, and neither saves, loads or resets",
          .hint = "stop one, or give it another topics.namespace or domain"});
   }
   return diagnostics;

@@ -60,6 +60,24 @@ std::vector<dds::Diagnostic> DiscoveryDiagnostics::diagnostics() {
   return last_;
 }
 
+std::string DiscoveryDiagnostics::namesake_refusal() {
+  const std::scoped_lock lock(mutex_);
+  const std::vector<dds::RemoteParticipant> others = namesakes(participant_.remote_participants());
+  if (others.empty()) return {};
+  std::string text = "it reaches " + std::to_string(others.size() + 1) + " servers called '" +
+                     name_space_ + "', this one (" + host_name() + ", process " +
+                     std::to_string(::getpid()) + ")";
+  for (const dds::RemoteParticipant& other : others) {
+    // The client may be on another host: "this host" would tell it nothing.
+    const std::string host = other.host.substr(0, other.host.find(':'));
+    text += " and another (" +
+            (host.empty() ? describe_location(other) : host + ", process " + other.process) + ")";
+  }
+  return text +
+         ", so none carries it out: stop all but one, or give each its own topics.namespace or "
+         "domain";
+}
+
 std::vector<dds::RemoteParticipant> DiscoveryDiagnostics::namesakes(
     const std::vector<dds::RemoteParticipant>& peers) {
   std::vector<dds::RemoteParticipant> found = dds::servers_called(name_space_, peers);

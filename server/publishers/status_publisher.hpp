@@ -32,6 +32,10 @@ class DiscoveryDiagnostics {
   /// At most a second old: comparing all endpoints takes time in a domain of many participants.
   [[nodiscard]] std::vector<dds::Diagnostic> diagnostics();
 
+  /// Why a request that changes something is refused: it went to other servers of this name, too,
+  /// which are named. Empty while there is none. As discovery knows it now.
+  [[nodiscard]] std::string namesake_refusal();
+
  private:
   using Clock = std::chrono::steady_clock;
 

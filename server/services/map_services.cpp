@@ -36,17 +36,47 @@ dds::ServiceOptions promptly(const std::string& name, PromptBudget& budget) {
                       const Work& work) { turns->run(work); }};
 }
 
+/// Of a service that may change something.
+template <typename Request>
+bool asks_for_change(const Request& request) {
+  if constexpr (requires { request.apply(); }) {
+    return request.apply();
+  } else {
+    return true;
+  }
+}
+
+/// `handler`'s answer; where it may change something, only while `refuses_changes` has no reason.
+template <typename Request, typename Reply>
+std::function<Reply(const Request&)> guarded(const ServiceHandler<Request, Reply>& handler,
+                                             const ServiceContext& context,
+                                             MapServices::ChangeRefusal refuses_changes) {
+  const auto answer = [&context, answer = handler.answer](const Request& request) {
+    return answer(context, request);
+  };
+  if constexpr (dds::CarriesRefusal<Reply>) {
+    if (handler.spec.effect == dds::ServiceEffect::modifies) {
+      return [&context, answer, refuses = std::move(refuses_changes)](const Request& request) {
+        const std::string reason = asks_for_change(request) ? refuses() : std::string();
+        if (reason.empty()) return answer(request);
+        Reply refusal;
+        refusal.status(reply_status(*context.latest_map.view(), wire::ReplyCode::failed, reason));
+        return refusal;
+      };
+    }
+  }
+  return answer;
+}
+
 }  // namespace
 
 MapServices::MapServices(dds::Participant& participant, const std::string& name_space,
-                         ServiceContext context)
+                         ServiceContext context, ChangeRefusal refuses_changes)
     : context_(std::move(context)) {
   for_each_handler(
       [&]<typename Request, typename Reply>(const ServiceHandler<Request, Reply>& handler) {
         const std::string name = handler.spec.in(name_space);
-        auto answer = [this, answer = handler.answer](const Request& request) {
-          return answer(context_, request);
-        };
+        auto answer = guarded(handler, context_, refuses_changes);
         const std::string thread_name(handler.spec.name);
         dds::ServiceOptions options = handler.urgency == AnswerUrgency::prompt
                                           ? promptly(thread_name, prompt_budget_)

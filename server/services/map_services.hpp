@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -14,8 +15,13 @@ namespace stillmap::server {
 /// delays no other service. On busy cores the mapper goes first, but for short prompt answers.
 class MapServices {
  public:
-  /// Throws DdsError when the topics cannot be made.
-  MapServices(dds::Participant& participant, const std::string& name_space, ServiceContext context);
+  /// Why a request that changes something is refused before it is looked at; empty when it is not.
+  using ChangeRefusal = std::function<std::string()>;
+
+  /// `refuses_changes` is asked for each such request, by several threads. Throws DdsError when the
+  /// topics cannot be made.
+  MapServices(dds::Participant& participant, const std::string& name_space, ServiceContext context,
+              ChangeRefusal refuses_changes);
 
  private:
   ServiceContext context_;

@@ -1,4 +1,4 @@
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 #include <signal.h>
 
 #include <algorithm>
@@ -8,6 +8,10 @@
 
 namespace stillmap::test {
 namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
 
 /// Whether the server that answers, whichever it is, says so of another one.
 bool names_another(const dds::ServerStatus& status) {
@@ -31,6 +35,46 @@ TEST(Namesake, IsToldAsLongAsItIsThere) {
     EXPECT_EQ(second.wait_for_exit(patience), 0);
   }
   EXPECT_TRUE(eventually([&] { return !names_another(client.status()); }));
+}
+
+/// Why this request was refused; empty where it was carried out.
+template <typename Request>
+std::string refusal_of(Request request) {
+  try {
+    request();
+  } catch (const ServiceError& refusal) {
+    return refusal.what();
+  }
+  return {};
+}
+
+TEST(Namesake, NoneChangesItsMapForARequestThatReachesBoth) {
+  const ServiceSetup setup("every");
+  const ServiceSetup another("every");
+  const ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  const std::uint64_t map_id = client.status().map_id;
+  {
+    ServerProcess second(another.server_arguments());
+    ASSERT_TRUE(eventually([&] { return names_another(client.status()); }));
+    for (const std::string& why :
+         {refusal_of([&] { client.reset(true); }), refusal_of([&] { client.save_map("a"); }),
+          refusal_of([&] { client.load_map("a"); }),
+          refusal_of([&] { static_cast<void>(client.localize({.guess = {}, .apply = true})); }),
+          refusal_of([&] { client.restore_removed(RemovalReason::moving, {}); })}) {
+      EXPECT_THAT(why, AllOf(HasSubstr("2 servers called 'stillmap'"), HasSubstr("process "),
+                             HasSubstr("topics.namespace")));
+    }
+    // It changes nothing, whichever looks.
+    EXPECT_THAT(refusal_of([&] { static_cast<void>(client.localize({})); }),
+                Not(HasSubstr("2 servers")));
+    second.send(SIGTERM);
+    EXPECT_EQ(second.wait_for_exit(patience), 0);
+  }
+  ASSERT_TRUE(eventually([&] { return !names_another(client.status()); }));
+  EXPECT_EQ(client.status().map_id, map_id);
+  EXPECT_NE(client.reset(true).map_id, map_id);
 }
 
 TEST(Namesake, IsNoServerOfAnotherName) {
