@@ -14,6 +14,7 @@
 #include "core/map/voxel_grid.hpp"
 #include "core/occupancy/occupancy_query.hpp"
 #include "core/occupancy/octomap_data.hpp"
+#include "core/occupancy/octree_encoding.hpp"
 #include "core/occupancy/octree_update.hpp"
 #include "core/occupancy/scan_update.hpp"
 
@@ -222,33 +223,31 @@ RayOccupancy OccupancyMap::along_ray(const RayQuery& ray) const {
   return cast_ray(state_->octree, ray);
 }
 
-OccupancyAnswers OccupancyMap::answer(const OccupancyQuery& query) const {
+OccupancyAnswers OccupancyMap::answer(const OccupancyQuery& query,
+                                      const ThrottleCallback& pause) const {
   if (const std::string faults = query.faults(); !faults.empty()) {
     throw std::invalid_argument(faults);
   }
   OccupancyAnswers answers{.resolution_m = resolution_m(), .points = {}, .boxes = {}, .rays = {}};
-  for (const Eigen::Vector3d& p_map : query.points_map) answers.points.push_back(at_point(p_map));
+  for (const Eigen::Vector3d& p_map : query.points_map) {
+    if (pause) pause();
+    answers.points.push_back(at_point(p_map));
+  }
   std::size_t voxels_left = query.max_voxels;
   std::size_t nodes_left = OccupancyQuery::max_box_nodes;
   for (const Eigen::AlignedBox3d& box_map : query.boxes_map) {
-    answers.boxes.push_back(query_box(state_->octree, box_map, voxels_left, nodes_left));
+    answers.boxes.push_back(query_box(state_->octree, box_map, voxels_left, nodes_left, pause));
     voxels_left -= answers.boxes.back().occupied_map.size();
   }
-  for (const RayQuery& ray : query.rays) answers.rays.push_back(along_ray(ray));
+  for (const RayQuery& ray : query.rays) {
+    if (pause) pause();
+    answers.rays.push_back(cast_ray(state_->octree, ray, pause));
+  }
   return answers;
 }
 
-OctomapData OccupancyMap::encode(bool binary) const {
-  std::ostringstream out;
-  if (binary) {
-    octomap::OcTree max_likelihood(state_->octree);
-    max_likelihood.toMaxLikelihood();
-    max_likelihood.prune();
-    max_likelihood.writeBinaryData(out);
-  } else {
-    state_->octree.writeData(out);
-  }
-  return {binary, state_->config.resolution_m, std::move(out).str()};
+OctomapData OccupancyMap::encode(bool binary, const ThrottleCallback& pause) const {
+  return {binary, state_->config.resolution_m, encode_octree(state_->octree, binary, pause)};
 }
 
 std::uint64_t OccupancyMap::version() const { return state_->version; }

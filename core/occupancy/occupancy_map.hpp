@@ -65,11 +65,14 @@ class OccupancyMap {
                                     std::size_t max_voxels) const;
   [[nodiscard]] RayOccupancy along_ray(const RayQuery& ray) const;
 
-  /// Throws std::invalid_argument with `query.faults()`.
-  [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query) const;
+  /// Throws std::invalid_argument with `query.faults()`. `pause` is called about every millisecond,
+  /// and a writer may have the octree meanwhile: what comes later in the answer is then of the
+  /// changed octree.
+  [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query,
+                                        const ThrottleCallback& pause = {}) const;
 
-  /// In OctoMap's encoding; binary data is pruned.
-  [[nodiscard]] OctomapData encode(bool binary) const;
+  /// In OctoMap's encoding; binary data is pruned. `pause` as above.
+  [[nodiscard]] OctomapData encode(bool binary, const ThrottleCallback& pause = {}) const;
 
   /// Incremented by every insertion.
   [[nodiscard]] std::uint64_t version() const;

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "core/occupancy/octree_grid.hpp"
+#include "core/occupancy/octree_parts.hpp"
 
 namespace stillmap {
 namespace {
@@ -65,6 +66,12 @@ class BoxCount {
 
   /// Whether all of it was counted.
   [[nodiscard]] bool is_whole() const { return is_whole_; }
+
+  /// Nodes that were looked at above those that are counted.
+  void count_above(std::size_t nodes) {
+    if (nodes > nodes_left_) is_whole_ = false;
+    nodes_left_ -= std::min(nodes, nodes_left_);
+  }
 
   /// `corner` is the lowest voxel of the node, `side` its voxels along an edge.
   void count(const OcTreeNode& node, const VoxelKey& corner, std::int32_t side) {
@@ -164,23 +171,29 @@ PointOccupancy query_point(const OcTree& octree, const Eigen::Vector3d& p_map) {
 }
 
 BoxOccupancy query_box(const OcTree& octree, const Eigen::AlignedBox3d& box_map,
-                       std::size_t max_voxels, std::size_t& nodes_left) {
+                       std::size_t max_voxels, std::size_t& nodes_left,
+                       const ThrottleCallback& pause) {
   BoxOccupancy result;
   result.fault = box_fault(octree, box_map);
   if (!result.fault.empty()) return result;
   const VoxelKey first = in_voxels(octree, box_map.min()).array().floor().cast<std::int32_t>();
   const VoxelKey last = in_voxels(octree, box_map.max()).array().floor().cast<std::int32_t>();
-  if (const OcTreeNode* const root = octree.getRoot(); root != nullptr) {
-    BoxCount count(octree, first, last, max_voxels, nodes_left, result);
-    count.count(*root, VoxelKey::Zero(), octree_side);
-    if (!count.is_whole()) {
-      BoxOccupancy refused;
-      refused.fault =
-          "the boxes up to this one have more than " +
-          std::to_string(OccupancyQuery::max_box_nodes) +
-          " nodes of the occupancy map; ask for fewer or smaller ones, in several requests";
-      return refused;
-    }
+  if (pause) pause();
+  const OctreeParts found = parts_of(octree, first, last);
+  BoxCount count(octree, first, last, max_voxels, nodes_left, result);
+  count.count_above(found.nodes_above);
+  for (const OctreePart& part : found.parts) {
+    if (!count.is_whole()) break;
+    if (pause) pause();
+    const OcTreeNode* const node = node_of(octree, part);
+    if (node != nullptr) count.count(*node, part.corner, part.side);
+  }
+  if (!count.is_whole()) {
+    BoxOccupancy refused;
+    refused.fault =
+        "the boxes up to this one have more than " + std::to_string(OccupancyQuery::max_box_nodes) +
+        " nodes of the occupancy map; ask for fewer or smaller ones, in several requests";
+    return refused;
   }
   const auto all = static_cast<std::uint64_t>(
       ((last - first).cast<std::int64_t>().array() + std::int64_t{1}).prod());
@@ -188,7 +201,8 @@ BoxOccupancy query_box(const OcTree& octree, const Eigen::AlignedBox3d& box_map,
   return result;
 }
 
-RayOccupancy cast_ray(const OcTree& octree, const RayQuery& query) {
+RayOccupancy cast_ray(const OcTree& octree, const RayQuery& query, const ThrottleCallback& pause) {
+  constexpr std::uint32_t steps_between_pauses = 1024;
   RayOccupancy result;
   result.fault = ray_fault(octree, query);
   if (!result.fault.empty()) return result;
@@ -201,7 +215,8 @@ RayOccupancy cast_ray(const OcTree& octree, const RayQuery& query) {
   };
   result.end = Occupancy::free;
   result.length_m = query.max_range_m;
-  for (; ray.entered_at() < length; ray.step()) {
+  for (std::uint32_t steps = 0; ray.entered_at() < length; ray.step()) {
+    if (++steps % steps_between_pauses == 0 && pause) pause();
     const Occupancy here =
         inside() ? occupancy_of(octree, octree.search(tree_key(ray.voxel()))) : Occupancy::unknown;
     const bool continues =

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "core/map/throttle_callback.hpp"
+
 namespace octomap {
 class OcTree;
 }
@@ -73,8 +75,7 @@ struct OccupancyQuery {
   static constexpr std::size_t max_boxes = 100;
   static constexpr std::size_t max_rays = 1000;
   static constexpr std::uint32_t max_listed_voxels = 100'000;
-  /// Nodes of the octree that all boxes together may have: half a second's work to a second's, in
-  /// which the octree does not grow.
+  /// Nodes of the octree that all boxes together may have: half a second's work to a second's.
   static constexpr std::size_t max_box_nodes = 10'000'000;
 
   /// One line for each limit that the request exceeds; empty when it can be answered.
@@ -96,11 +97,15 @@ struct OccupancyAnswers {
                                          const Eigen::Vector3d& p_map);
 
 /// At most `max_voxels` occupied voxels are listed; all are counted. Takes the octree's nodes that
-/// it looks at from `nodes_left`, and returns a fault where they are not enough.
+/// it looks at from `nodes_left`, and returns a fault where they are not enough. `pause` is called
+/// about every millisecond: meanwhile the octree may be changed, and what is not counted yet is
+/// counted as it then is.
 [[nodiscard]] BoxOccupancy query_box(const octomap::OcTree& octree,
                                      const Eigen::AlignedBox3d& box_map, std::size_t max_voxels,
-                                     std::size_t& nodes_left);
+                                     std::size_t& nodes_left, const ThrottleCallback& pause = {});
 
-[[nodiscard]] RayOccupancy cast_ray(const octomap::OcTree& octree, const RayQuery& ray);
+/// `pause` as of query_box.
+[[nodiscard]] RayOccupancy cast_ray(const octomap::OcTree& octree, const RayQuery& ray,
+                                    const ThrottleCallback& pause = {});
 
 }  // namespace stillmap

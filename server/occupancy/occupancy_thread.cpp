@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <thread>
 #include <utility>
 
 namespace stillmap::server {
@@ -88,7 +89,7 @@ void OccupancyThread::follow(std::shared_ptr<const MapSnapshot> view) {
 }
 
 void OccupancyThread::run(Residency job) {
-  const std::scoped_lock lock(map_mutex_);
+  const auto lock = lock_to_change();
   if (map_.sync_residency(*job.view)) ++changes_;
 }
 
@@ -102,8 +103,9 @@ void OccupancyThread::run(NewMap job) {
   }
   fresh.begin_residency(*job.view);
   {
-    const std::scoped_lock lock(map_mutex_);
+    const auto lock = lock_to_change();
     map_ = std::move(fresh);
+    ++maps_made_;
     stamp_ns_ = 0;
     jobs_.edit([&](const Jobs& jobs) {
       const bool another_waits = !jobs.empty() && std::holds_alternative<NewMap>(jobs.front());
@@ -126,13 +128,13 @@ void OccupancyThread::run(OccupancyScan scan) {
   const auto began = Clock::now();
   const bool clears = every_scan_counts_ || jobs_.waiting() <= max_scans_ / 2;
   if (!clears) statistics_.count("occupancy_not_cleared");
-  // Only this thread changes the map; a query waits for one portion at most.
+  // Only this thread changes the map; a query waits for one portion, and this for one of a query's.
   map_.compute_update(*scan.labelled, scan.T_map_lidar,
                       {.clear_free_space = clears, .unknown_is_solid = scan.unknown_is_solid},
                       throttle_);
   while (apply_portion()) throttle();
   {
-    const std::scoped_lock lock(map_mutex_);
+    const auto lock = lock_to_change();
     stamp_ns_ = scan.labelled->scan.stamp_ns;
     ++changes_;
   }
@@ -141,7 +143,7 @@ void OccupancyThread::run(OccupancyScan scan) {
 }
 
 bool OccupancyThread::apply_portion() {
-  const std::scoped_lock lock(map_mutex_);
+  const auto lock = lock_to_change();
   return map_.apply_update(OccupancyMap::portion_bricks);
 }
 
@@ -163,15 +165,53 @@ std::unique_lock<std::mutex> OccupancyThread::lock_made() const {
   return std::unique_lock(map_mutex_);
 }
 
+std::unique_lock<std::mutex> OccupancyThread::lock_to_change() {
+  wants_to_change_ = true;
+  std::unique_lock lock(map_mutex_);
+  wants_to_change_ = false;
+  return lock;
+}
+
+template <typename Read>
+auto OccupancyThread::of_one_map(Read read) const {
+  // For the octree's thread to wake up and take the lock. It may have idle priority: where it does
+  // not come, nobody waits for it.
+  constexpr std::chrono::microseconds handover(200);
+  struct AnotherMap {};
+  while (true) {
+    auto lock = lock_made();
+    if (next_map_ == NextMap::empty) return read(OccupancyMap(config_), 0, ThrottleCallback());
+    const std::uint64_t map = maps_made_;
+    auto since = std::chrono::steady_clock::now();
+    const auto pause = [&] {
+      if (std::chrono::steady_clock::now() - since < reading_portion) return;
+      if (wants_to_change_) {
+        lock.unlock();
+        std::this_thread::sleep_for(handover);
+        lock.lock();
+        if (maps_made_ != map || next_map_ != NextMap::none) throw AnotherMap();
+      }
+      since = std::chrono::steady_clock::now();
+    };
+    try {
+      return read(map_, stamp_ns_, ThrottleCallback(pause));
+    } catch (const AnotherMap&) {
+      // From the beginning, with the one that is there now.
+    }
+  }
+}
+
 OccupancyAnswers OccupancyThread::answer(const OccupancyQuery& query) const {
-  const auto lock = lock_made();
-  return next_map_ == NextMap::empty ? OccupancyMap(config_).answer(query) : map_.answer(query);
+  return of_one_map([&](const OccupancyMap& map, std::int64_t, const ThrottleCallback& pause) {
+    return map.answer(query, pause);
+  });
 }
 
 EncodedOctree OccupancyThread::encode(bool binary) const {
-  const auto lock = lock_made();
-  if (next_map_ == NextMap::empty) return {OccupancyMap(config_).encode(binary), 0};
-  return {map_.encode(binary), stamp_ns_};
+  return of_one_map(
+      [&](const OccupancyMap& map, std::int64_t stamp_ns, const ThrottleCallback& pause) {
+        return EncodedOctree{map.encode(binary, pause), stamp_ns};
+      });
 }
 
 std::future<EncodedOctree> OccupancyThread::encode_in_background() {
@@ -179,11 +219,6 @@ std::future<EncodedOctree> OccupancyThread::encode_in_background() {
   std::future<EncodedOctree> encoded = job.encoded.get_future();
   jobs_.edit([&](Jobs& jobs) { insert_urgent(jobs, std::move(job)); });
   return encoded;
-}
-
-std::uint64_t OccupancyThread::changes() const {
-  const std::scoped_lock lock(map_mutex_);
-  return changes_;
 }
 
 }  // namespace stillmap::server

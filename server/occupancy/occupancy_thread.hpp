@@ -69,16 +69,20 @@ class OccupancyThread {
   /// Drops and restores parts of the octree with the tiles that were evicted and reloaded.
   void follow(std::shared_ptr<const MapSnapshot> view);
 
+  /// Longest time for which an answer keeps the octree from being changed.
+  static constexpr std::chrono::milliseconds reading_portion{1};
+
   /// Throws std::invalid_argument for a query that asks for too much, OctreeNotMade where
-  /// the octree is not there `longest_wait` after `begin`.
+  /// the octree is not there `longest_wait` after `begin`. The octree goes on changing meanwhile;
+  /// all of an answer is of one map.
   [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query) const;
-  /// Encodes on the calling thread. Throws OctreeNotMade as `answer` does.
+  /// Encodes on the calling thread; the stamp is of the call's beginning. As `answer`.
   [[nodiscard]] EncodedOctree encode(bool binary) const;
   /// Encodes on this object's thread, before the scans that wait; one request at a time. The future
   /// throws std::future_error when the thread ends before.
   [[nodiscard]] std::future<EncodedOctree> encode_in_background();
   /// Grows with every change, over all maps.
-  [[nodiscard]] std::uint64_t changes() const;
+  [[nodiscard]] std::uint64_t changes() const { return changes_; }
   /// Grows with every `begin`.
   [[nodiscard]] std::uint64_t maps_begun() const { return maps_begun_; }
 
@@ -108,6 +112,13 @@ class OccupancyThread {
   void throttle() const;
   /// Waits while the octree is of a map that is no more, and the new one's is still being made.
   [[nodiscard]] std::unique_lock<std::mutex> lock_made() const;
+  /// The map's lock, for who changes it: who reads it lets go of it soon.
+  [[nodiscard]] std::unique_lock<std::mutex> lock_to_change();
+  /// What `read` makes of the octree, or of an empty one where that is the map's. `read` gets the
+  /// map, the stamp of its newest scan, and a pause, in which the octree may change; it starts over
+  /// where another map begins in one.
+  template <typename Read>
+  [[nodiscard]] auto of_one_map(Read read) const;
 
   OccupancyConfig config_;
   std::size_t max_scans_;
@@ -121,6 +132,10 @@ class OccupancyThread {
   bool is_released_ = false;
   mutable std::mutex map_mutex_;
   OccupancyMap map_;
+  /// Maps that `map_` has been; guarded by the map's lock.
+  std::uint64_t maps_made_ = 0;
+  /// Whether this object's thread waits for the map's lock.
+  std::atomic<bool> wants_to_change_ = false;
   /// What waits to replace it: a map without voxels needs no octree to answer from.
   enum class NextMap : std::uint8_t { none, empty, of_voxels };
   /// Changed under the queue's lock and the next one.
@@ -131,7 +146,7 @@ class OccupancyThread {
   /// When queries wait no longer for the map that has begun.
   std::chrono::steady_clock::time_point refused_from_;
   std::atomic<std::uint64_t> maps_begun_ = 0;
-  std::uint64_t changes_ = 0;
+  std::atomic<std::uint64_t> changes_ = 0;
   std::int64_t stamp_ns_ = 0;
   // Last: stops before what it uses is gone.
   Worker<Job> worker_;
