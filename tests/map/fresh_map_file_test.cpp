@@ -159,6 +159,28 @@ TEST_F(FreshMapFileTest, AMapThatWasToBeChangedFurtherIsNotTakenForWhole) {
   EXPECT_TRUE(names().empty());
 }
 
+TEST_F(FreshMapFileTest, WhatWasKilledInItsFirstStepGoesWhole) {
+  open_map_file(file_)->save(test::saved_map(1));
+  const pid_t child = fork();
+  if (child == 0) {
+    const FreshMapFile fresh(folder_ / "both.stillmap", FreshMapFile::Writing::in_steps);
+    const FreshMapFile copy(fresh.path());
+    fs::copy_file(file_, copy.path());
+    _exit(0);
+  }
+  waitpid(child, nullptr, 0);
+  ASSERT_EQ(left_fresh_files(folder_ / "both.stillmap").size(), 1U);
+  const fs::path left = left_fresh_files(folder_ / "both.stillmap").front().path.parent_path();
+  const fs::path copy = fs::directory_iterator(left)->path();
+  // What somebody else put there is not removed.
+  static_cast<void>(std::ofstream(copy / "mine") << "mine");
+  remove_useless_fresh_files(folder_ / "both.stillmap");
+  EXPECT_TRUE(fs::exists(copy / "mine"));
+  fs::remove(copy / "mine");
+  remove_useless_fresh_files(folder_ / "both.stillmap");
+  EXPECT_THAT(names(), ElementsAre("city.stillmap"));
+}
+
 TEST_F(FreshMapFileTest, WhatHoldsNoMapGoes) {
   const FreshMapFile fresh(file_);
   static_cast<void>(open_map_file(fresh.path()));

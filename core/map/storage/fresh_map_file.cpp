@@ -50,16 +50,35 @@ bool is_of_database(const fs::path& entry, const char* database) {
   return false;
 }
 
+/// Whether a process was killed while it made, in a fresh folder of its own, the map that is then
+/// changed in steps.
+bool is_first_step(const fs::path& entry) {
+  std::error_code error;
+  const std::string name = entry.filename().string();
+  const std::string begin = std::string(name_in_steps) + folder_suffix;
+  const bool is_named_so = name.starts_with(begin) &&
+                           name.size() == std::string_view(name_in_steps).size() + ending_of_folder;
+  if (!is_named_so || fs::symlink_status(entry, error).type() != fs::file_type::directory)
+    return false;
+  const std::vector<fs::path> entries = entries_of(entry, error);
+  return !error && std::ranges::all_of(entries, [](const fs::path& each) {
+    return is_of_database(each, name_in_folder);
+  });
+}
+
 /// The fresh map file of this folder, which may not be there yet; nothing where the folder has
 /// anything else in it, such as what somebody repaired: that is no process's to remove.
 std::optional<fs::path> fresh_file_of(const fs::path& folder) {
   std::error_code error;
   if (fs::symlink_status(folder, error).type() != fs::file_type::directory) return std::nullopt;
   const std::vector<fs::path> entries = entries_of(folder, error);
-  for (const char* name : {name_in_folder, name_in_steps}) {
-    if (std::ranges::all_of(entries, [&](const auto& each) { return is_of_database(each, name); }))
-      return folder / name;
-  }
+  if (std::ranges::all_of(entries,
+                          [](const auto& each) { return is_of_database(each, name_in_folder); }))
+    return folder / name_in_folder;
+  if (std::ranges::all_of(entries, [](const auto& each) {
+        return is_of_database(each, name_in_steps) || is_first_step(each);
+      }))
+    return folder / name_in_steps;
   return std::nullopt;
 }
 
