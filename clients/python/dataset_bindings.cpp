@@ -33,11 +33,11 @@ py::object scan_values(const py::object& self) {
 
 std::size_t index_from(const ScanDataset& dataset, py::ssize_t index) {
   const auto size = static_cast<py::ssize_t>(dataset.size());
-  if (index < 0) index += size;
-  if (index < 0 || index >= size) {
+  const py::ssize_t place = index < 0 ? index + size : index;
+  if (place < 0 || place >= size) {
     throw py::index_error("scan " + std::to_string(index) + " of " + std::to_string(size));
   }
-  return static_cast<std::size_t>(index);
+  return static_cast<std::size_t>(place);
 }
 
 void bind_scan(py::module_& module) {
@@ -202,7 +202,12 @@ void bind_dataset(py::module_& module) {
           "[m/s^2]).")
       .def_property_readonly(
           "faults", [](const SharedRecording& shared) { return shared.recording.faults; },
-          "What of a bag cannot be read at all, in words.");
+          "What of a bag cannot be read at all, in words.")
+      .def_property_readonly(
+          "remarks",
+          [](const SharedRecording& shared) { return shared.recording.dataset.remarks(); },
+          "What was understood or taken for granted, in words: from which fields intensity, times "
+          "and rings are; that files whose names tell no time follow each other by 0.1 s.");
   bind_open_dataset(module);
 }
 

@@ -1,5 +1,8 @@
 #include <pybind11/stl.h>
 
+#include <exception>
+#include <string_view>
+
 #include "clients/library/client.hpp"
 #include "clients/python/arrays.hpp"
 #include "clients/python/bindings.hpp"
@@ -14,18 +17,37 @@
 namespace stillmap::python {
 namespace {
 
+/// As py::register_exception, but with texts of any bytes, as names of files have them: in Python
+/// they look as os.fsdecode() writes them.
+template <typename Fault>
+const py::object& register_error(py::module_& module, const char* name, const py::object& base) {
+  // As long as the interpreter: the translator uses it, and has no other way to it.
+  static const auto& kind = *new py::object(py::exception<Fault>(module, name, base));
+  py::register_exception_translator([](std::exception_ptr fault) {
+    try {
+      if (fault) std::rethrow_exception(fault);
+    } catch (const Fault& error) {
+      const std::string_view text = error.what();
+      const auto decoded = py::reinterpret_steal<py::object>(PyUnicode_DecodeUTF8(
+          text.data(), static_cast<py::ssize_t>(text.size()), "surrogateescape"));
+      if (decoded) PyErr_SetObject(kind.ptr(), decoded.ptr());
+    }
+  });
+  return kind;
+}
+
 /// They have the text that the command line prints.
 void bind_errors(py::module_& module) {
   // The one that was registered last is tried first: the general ones before the special ones.
   const auto error = py::exception<std::runtime_error>(module, "Error", PyExc_RuntimeError);
   module.attr("Error").attr("__doc__") = "What goes wrong outside of the caller's code.";
-  py::register_exception<DatasetError>(module, "DatasetError", error);
-  py::register_exception<MapFileError>(module, "MapFileError", error);
-  py::register_exception<ConfigError>(module, "ConfigError", error);
-  py::register_exception<ModelError>(module, "ModelError", error);
-  py::register_exception<dds::DdsError>(module, "DdsError", error);
-  const auto& service = py::register_exception<ServiceError>(module, "ServiceError", error);
-  py::register_exception<ServiceTimeout>(module, "ServiceTimeout", service);
+  register_error<DatasetError>(module, "DatasetError", error);
+  register_error<MapFileError>(module, "MapFileError", error);
+  register_error<ConfigError>(module, "ConfigError", error);
+  register_error<ModelError>(module, "ModelError", error);
+  register_error<dds::DdsError>(module, "DdsError", error);
+  const auto& service = register_error<ServiceError>(module, "ServiceError", error);
+  register_error<ServiceTimeout>(module, "ServiceTimeout", service);
 }
 
 void bind_classes(py::module_& module) {

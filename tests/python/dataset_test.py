@@ -1,5 +1,7 @@
 """Recordings scan by scan."""
 
+import os
+
 import numpy as np
 import pytest
 import stillmap
@@ -17,6 +19,21 @@ def test_scans_are_the_files(city):
     assert dataset.sensor.name == "VLP-16"
     assert len(dataset.truth) == len(dataset)
     assert dataset.faults == []
+    assert dataset.remarks == []
+
+
+def test_what_was_taken_for_granted_is_told(city, tmp_path):
+    for i, file in enumerate(sorted((city / "velodyne").glob("*.bin"))):
+        (tmp_path / f"{i:06}.bin").symlink_to(file)
+    remarks = stillmap.open_dataset(tmp_path).remarks
+    assert any("tell no time" in remark for remark in remarks), remarks
+
+
+def test_what_is_wrong_is_told_whatever_bytes_the_name_has(tmp_path):
+    name = os.fsdecode(os.fsencode(tmp_path) + b"/no_utf8_\xff")
+    with pytest.raises(stillmap.DatasetError) as error:
+        stillmap.open_dataset(name)
+    assert name in str(error.value) and "no such file" in str(error.value)
 
 
 def test_classes_are_not_read_as_ids_without_a_word(city, tmp_path):
@@ -39,6 +56,8 @@ def test_places_count_as_in_a_list(city):
     assert dataset.stamps_ns[3] == dataset[3].stamp_ns
     with pytest.raises(IndexError):
         dataset[len(dataset)]
+    with pytest.raises(IndexError, match=f"scan {-len(dataset) - 1} of"):
+        dataset[-len(dataset) - 1]
 
 
 def test_the_imu_lies_beside(city):
