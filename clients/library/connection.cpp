@@ -1,7 +1,9 @@
 #include "clients/library/connection.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <set>
+#include <vector>
 
 #include "idl/conversions/tile.hpp"
 #include "idl/interface/participant_diagnostics.hpp"
@@ -128,6 +130,31 @@ TileVersions Client::Connection::list_tiles(const Eigen::AlignedBox3d& box_map) 
     has_more = !reply.continuation().empty();
   }
   return versions;
+}
+
+void Client::Connection::require_one_server(const std::string& service) {
+  std::vector<dds::RemoteParticipant> servers =
+      dds::servers_called(options.server_name, participant.remote_participants());
+  if (servers.size() < 2) return;
+  // One that was killed is known until its lease ends.
+  constexpr std::chrono::milliseconds longest_answer(1000);
+  GetStatus_Request question;
+  question.format_version(dds::wire_format_version);
+  const std::vector<std::string> alive =
+      client_of(dds::services::get_status)
+          .who_answers(question, std::min(longest_answer, options.request_timeout));
+  std::erase_if(servers, [&](const dds::RemoteParticipant& server) {
+    return std::ranges::find(alive, server.guid) == alive.end();
+  });
+  if (servers.size() < 2) return;
+  std::string text = service + " was not sent, since it would reach " +
+                     std::to_string(servers.size()) + " servers called '" + options.server_name +
+                     "':";
+  for (const dds::RemoteParticipant& server : servers)
+    text += (&server == &servers.front() ? " " : "; ") + describe_location(server);
+  throw ServiceError(text +
+                     ". Reach one of them alone (--peer, --domain), stop all but one, or give each "
+                     "its own topics.namespace (--server)");
 }
 
 ServiceError Client::Connection::malformed_reply(const std::string& service) {

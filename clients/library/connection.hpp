@@ -32,6 +32,7 @@ struct Client::Connection {
     }
     auto& client = client_of(spec);
     if (!client.refusal().empty()) throw ServiceError(name_of(spec) + ": " + client.refusal());
+    if (dds::asks_for_change(spec, request)) require_one_server(name_of(spec));
     const auto began = std::chrono::steady_clock::now();
     auto reply = client.call(request, timeout);
     if (!reply) {
@@ -121,6 +122,11 @@ struct Client::Connection {
 
   /// The tiles whose footprint meets the box (map frame [m]), all of one map.
   [[nodiscard]] TileVersions list_tiles(const Eigen::AlignedBox3d& box_map);
+
+  /// Throws ServiceError that names them where several servers have this name and answer: a request
+  /// that changes something would change all of their maps. Servers refuse it themselves where they
+  /// see each other; a client may see those that do not, as by peers of its own.
+  void require_one_server(const std::string& service);
 
   [[nodiscard]] static ServiceError malformed_reply(const std::string& service);
   /// What is known of a call without an answer.

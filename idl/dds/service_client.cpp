@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 #include <random>
+#include <set>
+#include <sstream>
 #include <utility>
 
 namespace stillmap::dds {
@@ -63,6 +65,24 @@ std::optional<SerializedSample> UntypedServiceClient::call(const SerializedSampl
     return true;
   });
   return answered ? std::optional(std::move(reply)) : std::nullopt;
+}
+
+std::vector<std::string> UntypedServiceClient::who_answers(const void* request,
+                                                           std::chrono::milliseconds timeout) {
+  const auto deadline = Clock::now() + timeout;
+  sent_.clear();
+  send(to_bytes(request_type_, request, 0), {.client = replies_.guid(), .number = ++call_number_});
+  std::set<std::string> found;
+  SerializedSample bytes;
+  eprosima::fastdds::dds::SampleInfo info;
+  while (static_cast<int>(found.size()) < replies_.events().matched_writers() &&
+         replies_.take(bytes, info, {}, left_until(deadline))) {
+    if (!is_ours(info.related_sample_identity)) continue;
+    std::ostringstream prefix;
+    prefix << info.sample_identity.writer_guid().guidPrefix;
+    found.insert(prefix.str());
+  }
+  return {found.begin(), found.end()};
 }
 
 bool UntypedServiceClient::exchange(const SerializedSample& request,

@@ -38,6 +38,12 @@ class UntypedServiceClient {
                                                      std::chrono::milliseconds timeout,
                                                      const std::stop_token& stop);
 
+  /// Guid prefixes, as RemoteParticipant::guid, of those that answer this request within `timeout`:
+  /// it is sent once, and all that offer the service are waited for. For requests that change
+  /// nothing.
+  [[nodiscard]] std::vector<std::string> who_answers(const void* request,
+                                                     std::chrono::milliseconds timeout);
+
  private:
   using Clock = std::chrono::steady_clock;
   /// False for bytes that are no answer.
@@ -102,6 +108,15 @@ class ServiceClient {
         deadline - std::chrono::steady_clock::now());
     if (!client_->call(&request, &reply, left, stop)) return std::nullopt;
     return reply;
+  }
+
+  /// As UntypedServiceClient::who_answers. Throws NotPermitted.
+  [[nodiscard]] std::vector<std::string> who_answers(const Request& request,
+                                                     std::chrono::milliseconds timeout) {
+    if (!refusal_.empty()) throw NotPermitted(refusal_);
+    const Turn turn(*this, std::chrono::steady_clock::now() + timeout);
+    if (!turn.has_come()) return {};
+    return client_->who_answers(&request, timeout);
   }
 
  private:

@@ -41,6 +41,19 @@ struct ServiceSpec {
   }
 };
 
+/// Whether this request of the service may change something: of those that can look alone, only
+/// where they are told to apply what they find.
+template <typename Request, typename Reply>
+[[nodiscard]] bool asks_for_change(const ServiceSpec<Request, Reply>& spec,
+                                   const Request& request) {
+  if (spec.effect == ServiceEffect::reads) return false;
+  if constexpr (requires { request.apply(); }) {
+    return request.apply();
+  } else {
+    return true;
+  }
+}
+
 /// The table of services: the server's handlers, the client, the roles and the fuzz target of
 /// requests go through it.
 namespace services {

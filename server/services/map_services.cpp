@@ -36,16 +36,6 @@ dds::ServiceOptions promptly(const std::string& name, PromptBudget& budget) {
                       const Work& work) { turns->run(work); }};
 }
 
-/// Of a service that may change something.
-template <typename Request>
-bool asks_for_change(const Request& request) {
-  if constexpr (requires { request.apply(); }) {
-    return request.apply();
-  } else {
-    return true;
-  }
-}
-
 /// `handler`'s answer; where it may change something, only while `refuses_changes` has no reason.
 template <typename Request, typename Reply>
 std::function<Reply(const Request&)> guarded(const ServiceHandler<Request, Reply>& handler,
@@ -55,17 +45,17 @@ std::function<Reply(const Request&)> guarded(const ServiceHandler<Request, Reply
     return answer(context, request);
   };
   if constexpr (dds::CarriesRefusal<Reply>) {
-    if (handler.spec.effect == dds::ServiceEffect::modifies) {
-      return [&context, answer, refuses = std::move(refuses_changes)](const Request& request) {
-        const std::string reason = asks_for_change(request) ? refuses() : std::string();
-        if (reason.empty()) return answer(request);
-        Reply refusal;
-        refusal.status(reply_status(*context.latest_map.view(), wire::ReplyCode::failed, reason));
-        return refusal;
-      };
-    }
+    return [&context, answer, spec = handler.spec,
+            refuses = std::move(refuses_changes)](const Request& request) {
+      const std::string reason = dds::asks_for_change(spec, request) ? refuses() : std::string();
+      if (reason.empty()) return answer(request);
+      Reply refusal;
+      refusal.status(reply_status(*context.latest_map.view(), wire::ReplyCode::failed, reason));
+      return refusal;
+    };
+  } else {
+    return answer;
   }
-  return answer;
 }
 
 }  // namespace

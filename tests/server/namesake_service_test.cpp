@@ -2,8 +2,13 @@
 #include <signal.h>
 
 #include <algorithm>
+#include <atomic>
+#include <optional>
 #include <string>
+#include <thread>
 
+#include "idl/dds/service_server.hpp"
+#include "idl/interface/services.hpp"
 #include "tests/server/server_process.hpp"
 
 namespace stillmap::test {
@@ -75,6 +80,44 @@ TEST(Namesake, NoneChangesItsMapForARequestThatReachesBoth) {
   ASSERT_TRUE(eventually([&] { return !names_another(client.status()); }));
   EXPECT_EQ(client.status().map_id, map_id);
   EXPECT_NE(client.reset(true).map_id, map_id);
+}
+
+/// What a client needs of a server that does not see the other one, and so does not refuse.
+struct ServerAlone {
+  explicit ServerAlone(const dds::DdsOptions& options, bool answers = true)
+      : participant(options),
+        status(participant, dds::services::get_status.in("stillmap"),
+               [answers](const auto&) -> stillmap_msgs::srv::GetStatus_Response {
+                 if (!answers) std::this_thread::sleep_for(std::chrono::seconds(3));
+                 return {};
+               }),
+        reset(participant, dds::services::reset.in("stillmap"), [this](const auto&) {
+          ++resets;
+          return stillmap_msgs::srv::Reset_Response();
+        }) {}
+
+  std::atomic<int> resets = 0;
+  dds::Participant participant;
+  dds::ServiceServer<stillmap_msgs::srv::GetStatus_Request, stillmap_msgs::srv::GetStatus_Response>
+      status;
+  dds::ServiceServer<stillmap_msgs::srv::Reset_Request, stillmap_msgs::srv::Reset_Response> reset;
+};
+
+TEST(Namesake, AClientThatSeesTwoSendsNoChangeToEither) {
+  const ServiceSetup setup("every");
+  Client client(setup.client());
+  ServerAlone one(setup.dds());
+  std::optional<ServerAlone> other(std::in_place, setup.dds());
+  ASSERT_TRUE(eventually([&] {
+    return refusal_of([&] { client.reset(); }).find("2 servers called 'stillmap'") !=
+           std::string::npos;
+  }));
+  const int resets = one.resets + other->resets;
+  EXPECT_THAT(refusal_of([&] { client.reset(); }), HasSubstr("was not sent"));
+  EXPECT_EQ(one.resets + other->resets, resets);
+  // One that is there no more, or hangs, keeps nobody from it.
+  other.emplace(setup.dds(), false);
+  EXPECT_TRUE(eventually([&] { return refusal_of([&] { client.reset(); }).empty(); }));
 }
 
 TEST(Namesake, IsNoServerOfAnotherName) {
