@@ -1,5 +1,10 @@
 #include <signal.h>
 
+#include <algorithm>
+#include <chrono>
+#include <set>
+#include <thread>
+
 #include "core/map/storage/map_file.hpp"
 #include "tests/clients/command_test.hpp"
 
@@ -133,6 +138,54 @@ TEST_F(MergeCommandTest, KeepsToItsOwnFilesAndIsAloneWithThem) {
   EXPECT_EQ(stopped.wait(), -1) << "as by a signal that nobody waits for";
   EXPECT_TRUE(fs::is_empty(folder_ / "tmp"));
   EXPECT_FALSE(exists("d.stillmap"));
+}
+
+/// Kills runs of a command that writes `file`, each a little later after it began to.
+class KilledMergeTest : public MergeCommandTest {
+ protected:
+  /// What such runs write, or left.
+  [[nodiscard]] std::set<fs::path> unfinished(const std::string& file) const {
+    std::set<fs::path> found;
+    for (const auto& entry : fs::directory_iterator(folder_)) {
+      if (entry.path().filename().string().starts_with(file + ".new-")) found.insert(entry.path());
+    }
+    return found;
+  }
+  /// Runs it to its end, too.
+  void kill_and_repeat(const std::string& arguments, const std::string& file,
+                       std::size_t poses_when_done) const {
+    const std::string before = content(file);
+    for (int i = 0; i < 4; ++i) {
+      const std::set<fs::path> left = unfinished(file);
+      BackgroundProcess killed(stillmap_program() + " " + arguments, folder_ / "log");
+      ASSERT_TRUE(eventually([&] { return !std::ranges::includes(left, unfinished(file)); }))
+          << content("log");
+      std::this_thread::sleep_for(i * std::chrono::milliseconds(15));
+      killed.send(SIGKILL);
+      killed.wait();
+      if (content(file) == before) continue;
+      ASSERT_EQ(run("map-check " + path(file)).exit_code, 0) << i;
+      EXPECT_EQ(open_map_file(path(file))->load().trajectory.size(), poses_when_done) << i;
+    }
+    const ProcessResult again = run(arguments);
+    ASSERT_EQ(again.exit_code, 0) << again.err;
+    EXPECT_EQ(open_map_file(path(file))->load().trajectory.size(), poses_when_done);
+    EXPECT_TRUE(unfinished(file).empty()) << "what the killed ones left";
+  }
+};
+
+TEST_F(KilledMergeTest, LeavesTheOldMapOrTheNewOneAndCanBeRunAgain) {
+  const std::string a_before = content("a/map.stillmap"), b_before = content("b/map.stillmap");
+  fs::copy_file(map("b"), path("c.stillmap"));
+  kill_and_repeat("merge " + map("a") + " " + map("b") + " --force --out " + path("c.stillmap"),
+                  "c.stillmap", 90 + 100);
+  EXPECT_EQ(content("a/map.stillmap"), a_before);
+  EXPECT_EQ(content("b/map.stillmap"), b_before);
+  const std::string c_before = content("c.stillmap");
+  kill_and_repeat(
+      "sessions " + path("c.stillmap") + " --withdraw 2 --force --out " + path("d.stillmap"),
+      "d.stillmap", 90);
+  EXPECT_EQ(content("c.stillmap"), c_before);
 }
 
 }  // namespace

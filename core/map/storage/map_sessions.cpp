@@ -7,9 +7,13 @@
 
 #include <limits>
 #include <memory>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
+#include "core/map/storage/fresh_map_file.hpp"
 #include "core/map/storage/map_database.hpp"
+#include "core/map/storage/map_file.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/map/storage/map_tables.hpp"
 #include "core/map/storage/save_marks.hpp"
@@ -121,6 +125,21 @@ MapSession withdrawable_session(SQLite::Database& database, const fs::path& file
   return newest;
 }
 
+/// The copy becomes `out`, where a map or nothing is. What a process that is killed meanwhile
+/// leaves beside it is of no use: the map that was copied stays.
+void put_in_place_of(const fs::path& out, const MapFileCopy& copy) {
+  // Another program's file is not overwritten.
+  if (const fs::path file = real_file(out); fs::exists(file))
+    static_cast<void>(open_map_database(file));
+  try {
+    const FreshMapFile fresh(out, FreshMapFile::Writing::in_steps);
+    open_map_file(copy.path())->copy_to(fresh.path());
+    replace_map_file(fresh.path(), out);
+  } catch (const std::runtime_error& error) {
+    throw MapFileWriteError(out, std::string("cannot be written (") + error.what() + ")");
+  }
+}
+
 }  // namespace
 
 std::vector<MapSession> read_map_sessions(const fs::path& file) {
@@ -171,7 +190,7 @@ void withdraw_newest_session(const fs::path& file, const fs::path& out) {
     transaction.commit();
     database.exec("VACUUM");
   });
-  open_map_file(copy.path())->copy_to(out);
+  put_in_place_of(out, copy);
 }
 
 }  // namespace stillmap
