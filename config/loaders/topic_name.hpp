@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -9,6 +10,10 @@ namespace stillmap {
 
 inline constexpr std::string_view topic_rule =
     "; ROS 2 names have letters, digits, '_', and '/' between parts that begin with no digit";
+
+/// Of what a topic or a server is called. DDS names have 255 characters at most, which Fast DDS
+/// cuts without a word; this leaves room for "rt/" and for the longest name of a service behind it.
+inline constexpr std::size_t longest_topic_name = 200;
 
 /// Whether a part of a name begins with a digit.
 [[nodiscard]] inline bool has_part_with_digit_first(std::string_view name) {
@@ -34,6 +39,10 @@ inline constexpr std::string_view topic_rule =
 [[nodiscard]] inline std::string to_topic_name(std::string& name) {
   const std::string given = name;
   if (name.starts_with('/')) name.erase(0, 1);
+  if (name.size() > longest_topic_name) {
+    return "'" + given.substr(0, 40) + "...' has " + std::to_string(name.size()) +
+           " characters; a topic's name has " + std::to_string(longest_topic_name) + " at most";
+  }
   if (is_topic_name(name)) return {};
   return "'" + given + "' is no topic name" + std::string(topic_rule);
 }

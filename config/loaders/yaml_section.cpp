@@ -73,6 +73,10 @@ std::string shown(Range allowed) {
   return text.str();
 }
 
+bool has_null_character(const YAML::Node& node) {
+  return node.IsScalar() && node.Scalar().find('\0') != std::string::npos;
+}
+
 template <typename T>
 std::optional<T> parsed(const YAML::Node& node) {
   if (!node.IsScalar()) return std::nullopt;
@@ -242,7 +246,10 @@ void YamlSection::boolean(const std::string& name, bool& value) {
 void YamlSection::text(const std::string& name, std::string& value) {
   const std::optional<YAML::Node> node = field(name);
   if (!node) return;
-  if (node->IsScalar() || node->IsNull()) {
+  const bool has_text = node->IsScalar() || node->IsNull();
+  if (has_text && has_null_character(*node)) {
+    fault(name, "has a character \\0, at which names of files and topics would end");
+  } else if (has_text) {
     assign(name, value, node->IsNull() ? std::string() : node->Scalar());
   } else {
     fault(name, shown(*node) + " is not allowed; a text");
@@ -254,7 +261,7 @@ void YamlSection::text_list(const std::string& name, std::vector<std::string>& v
   if (!items) return;
   std::vector<std::string> read;
   for (const YAML::Node& item : *items) {
-    if (item.IsScalar() && !item.Scalar().empty()) {
+    if (item.IsScalar() && !item.Scalar().empty() && !has_null_character(item)) {
       read.push_back(item.Scalar());
     } else {
       file_.fault(item, path_of(name), shown(item) + " is not allowed; texts that are not empty");

@@ -279,6 +279,11 @@ TEST(ServerConfig, RefusesValuesThatDoNotFitTogether) {
   EXPECT_THAT(refusal_of("dds: {interfaces: [eth0]}"), HasSubstr("not an IPv4 address"));
   EXPECT_THAT(refusal_of("dds: {profile: ether}"), HasSubstr("DDS profile 'ether'"));
   EXPECT_THAT(refusal_of("topics: {points: 'a b'}"), HasSubstr("topics.points"));
+  EXPECT_THAT(refusal_of("topics: {points: " + std::string(201, 'a') + "}"),
+              AllOf(HasSubstr("topics.points"), HasSubstr("201 characters")));
+  EXPECT_EQ(refusal_of("topics: {points: " + std::string(200, 'a') + "}"), "");
+  EXPECT_THAT(refusal_of(R"(map: {file: "a\0b"})"), HasSubstr("map.file: has a character \\0"));
+  EXPECT_THAT(refusal_of(R"(dds: {peers: ["a\0b"]})"), HasSubstr("dds.peers"));
   EXPECT_THAT(refusal_of("topics: {points: 1abc}"), HasSubstr("begin with no digit"));
   EXPECT_THAT(refusal_of("topics: {gnss: robot/2/fix}"), HasSubstr("topics.gnss"));
   EXPECT_THAT(refusal_of("topics: {gnss: fix}\nmap: {close_loops: false}"),
