@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "core/dataset/binary_file.hpp"
@@ -160,10 +161,24 @@ void pack_ply(const ColouredPoint& point, char* to) {
              << rgb.b << label_of(point) << point.confidence;
 }
 
+/// Where to write what becomes the file `real`: beside it, so that one that is there stays until
+/// the new one is whole; into it where it is a pipe or the like.
+std::filesystem::path written_first(const std::filesystem::path& real) {
+  std::error_code ignored;
+  const std::filesystem::file_status there = std::filesystem::status(real, ignored);
+  if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there)) return real;
+  return real.string() + ".unfinished";
+}
+
 template <std::size_t point_bytes, class Pack>
 void write_cloud(const std::filesystem::path& file, const std::string& header,
                  std::span<const ColouredPoint> points, Pack pack) {
-  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+  std::error_code fault;
+  // A link stays, and what it leads to is replaced.
+  const std::filesystem::path resolved = std::filesystem::weakly_canonical(file, fault);
+  const std::filesystem::path real = fault ? file : resolved;
+  const std::filesystem::path unfinished = written_first(real);
+  std::ofstream out(unfinished, std::ios::binary | std::ios::trunc);
   out << header;
   std::array<char, point_bytes> bytes{};
   for (const ColouredPoint& point : points) {
@@ -171,7 +186,11 @@ void write_cloud(const std::filesystem::path& file, const std::string& header,
     out.write(bytes.data(), point_bytes);
   }
   out.close();
-  if (!out) throw DatasetWriteError(file, "cannot be written; check the folder and the space left");
+  fault.clear();
+  if (out && unfinished != real) std::filesystem::rename(unfinished, real, fault);
+  if (out && !fault) return;
+  if (unfinished != real) std::filesystem::remove(unfinished, fault);
+  throw DatasetWriteError(file, "cannot be written; check the folder and the space left");
 }
 
 }  // namespace

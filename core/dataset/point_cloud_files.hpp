@@ -39,7 +39,8 @@ struct ColouredPoint {
 };
 
 /// Writes binary PCD or PLY: x y z, the class's colour (PCD: packed `rgb`, PLY: red green blue),
-/// `label` (SemanticKITTI's original id, uint32) and `confidence`. Throws DatasetError.
+/// `label` (SemanticKITTI's original id, uint32) and `confidence`. A file that is there stays until
+/// the new one is whole. Throws DatasetWriteError.
 void write_pcd(const std::filesystem::path& file, std::span<const ColouredPoint> points);
 void write_ply(const std::filesystem::path& file, std::span<const ColouredPoint> points);
 

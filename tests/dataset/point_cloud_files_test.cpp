@@ -2,10 +2,14 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <cstring>
+#include <filesystem>
+#include <iterator>
 #include <random>
 
 #include "core/dataset/dataset_error.hpp"
@@ -208,6 +212,42 @@ TEST(PointCloudFiles, AnEmptyMapCanBeWrittenAndRead) {
   EXPECT_TRUE(read_point_cloud(folder.path() / "map.pcd", 0).scan.empty());
   EXPECT_TRUE(read_point_cloud(folder.path() / "map.ply", 0).scan.empty());
   EXPECT_THROW(write_ply(folder.path() / "no" / "map.ply", {}), DatasetError);
+}
+
+/// Of no file more than this is written, as on a full disk.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{.rlim_cur = bytes, .rlim_max = before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit() { setrlimit(RLIMIT_FSIZE, &before_); }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
+TEST(PointCloudFiles, AMapThatFindsNoRoomLeavesTheOneBeforeIt) {
+  const ScratchFolder folder;
+  const std::filesystem::path file = folder.path() / "map.ply";
+  write_ply(file, std::vector<ColouredPoint>(3));
+  const std::string before = content_of(file);
+  {
+    const FileSizeLimit limit(10'000);
+    EXPECT_THROW(write_ply(file, std::vector<ColouredPoint>(1000)), DatasetWriteError);
+  }
+  EXPECT_EQ(content_of(file), before);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+  // What a link leads to is replaced, not the link.
+  const std::filesystem::path link = folder.path() / "link.ply";
+  std::filesystem::create_symlink(file, link);
+  write_ply(link, std::vector<ColouredPoint>(5));
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_EQ(read_point_cloud(file, 0).scan.size(), 5U);
 }
 
 TEST(PointCloudFiles, FaultsNameFileAndReason) {
