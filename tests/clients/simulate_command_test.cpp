@@ -85,6 +85,11 @@ TEST_F(SimulateCommandTest, RefusesWhatItDoesNotKnow) {
   const ProcessResult sensor = run(out + " --sensor hdl_65");
   EXPECT_EQ(sensor.exit_code, 2);
   EXPECT_THAT(sensor.err, HasSubstr("hdl_65"));
+  for (const std::string delay : {"nan", "inf", "-1e300", "1e10"}) {
+    const ProcessResult late = run(out + " --gnss 1 --gnss-delay " + delay);
+    EXPECT_EQ(late.exit_code, 2) << delay;
+    EXPECT_THAT(late.err, HasSubstr("--gnss-delay")) << delay;
+  }
   EXPECT_FALSE(exists("city"));
 }
 

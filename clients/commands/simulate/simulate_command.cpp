@@ -1,6 +1,8 @@
+#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <stdexcept>
 
 #include "clients/commands/arguments/simulation_arguments.hpp"
 #include "clients/commands/command.hpp"
@@ -62,8 +64,17 @@ Written write_sequence(const SimulateArguments& arguments, const simulation::Sim
   return written;
 }
 
+/// Throws std::invalid_argument for one that stamps cannot have.
+void check_gnss_delay(double delay_s) {
+  constexpr double day_s = 86'400.0;
+  // Written so that NaN fails.
+  if (std::abs(delay_s) <= day_s) return;
+  throw std::invalid_argument("--gnss-delay must be a number of seconds, a day at most");
+}
+
 ExitCode run(const SimulateArguments& arguments) {
   StopSignal stop;
+  check_gnss_delay(arguments.gnss_delay_s);
   const simulation::SimulationConfig config = simulation_config(arguments.simulation);
   const simulation::Simulation simulation(config);
   const Written written = write_sequence(arguments, simulation, stop);
