@@ -17,6 +17,9 @@ constexpr double max_gap_m = 0.5;
 /// Of a stretch: long enough for a turn, short enough for odometry not to drift [m].
 constexpr double min_stretch_m = 100.0;
 constexpr std::size_t min_stretch_fixes = 12;
+/// Of its fixes, where they are put by a delay, so many lie on the way: of half of a stretch
+/// anything fits better than of all of it.
+constexpr double min_known_share = 0.9;
 /// Fixes of a stretch lie so far apart at least, and so many standard deviations [m].
 constexpr double min_spacing_m = 1.0;
 constexpr double spacing_sigmas = 1.0;
@@ -26,12 +29,16 @@ constexpr int max_standing = 5;
 /// Where the kernel begins to take a fix for a reflection: odometry errs, too [m].
 constexpr double min_kernel_m = 0.3;
 constexpr double coarse_step_s = 0.5;
+/// Speed is that over so long: from scan to scan the noise of odometry is taken for changes of it,
+/// and for knowledge of a delay on a way that has none.
+constexpr double velocity_window_s = 1.0;
 constexpr double fine_step_s = 0.05;
 /// Errors of so many neighbouring fixes are the same.
 constexpr double correlated_fixes = 10.0;
-/// Of a delay of seconds, in all and as a share of what there is to gain.
-constexpr double min_gain = 5.0;
-constexpr double min_gain_share = 0.1;
+/// Of a delay of seconds, for each fix and as a share of what there is to gain: it puts what turns
+/// off the way by tens of metres. What lies on the way without it denies it.
+constexpr double min_gain_of_fix = 0.2;
+constexpr double min_gain_share = 0.3;
 /// Of delays that gain so much of what the best one does, the shortest is the one: a way that goes
 /// on as it went fits itself a bend later, too.
 constexpr double as_good_share = 0.95;
@@ -66,10 +73,9 @@ Place place_at(std::span<const PlanPose> way, std::int64_t stamp_ns) {
   const Eigen::Vector2d step = after->antenna_odom - before.antenna_odom;
   const std::int64_t gap_ns = after->stamp_ns - before.stamp_ns;
   if (gap_ns > max_gap_ns && step.norm() > max_gap_m) return {};
-  const double gap_s = 1e-9 * static_cast<double>(gap_ns);
   const double share =
       static_cast<double>(stamp_ns - before.stamp_ns) / static_cast<double>(gap_ns);
-  return {before.antenna_odom + share * step, step / gap_s,
+  return {before.antenna_odom + share * step, Eigen::Vector2d::Zero(),
           share < 0.5 ? before.axes_odom : after->axes_odom, true};
 }
 
@@ -172,6 +178,19 @@ class Stretches {
     return places;
   }
 
+  /// The same with their velocities.
+  [[nodiscard]] std::vector<Place> moving_places_at(double delay_s) const {
+    std::vector<Place> places = places_at(delay_s);
+    const std::vector<Place> before = places_at(delay_s + 0.5 * velocity_window_s);
+    const std::vector<Place> after = places_at(delay_s - 0.5 * velocity_window_s);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      if (!before[i].is_known || !after[i].is_known) continue;
+      places[i].velocity_odom =
+          (after[i].antenna_odom - before[i].antenna_odom) / velocity_window_s;
+    }
+    return places;
+  }
+
   [[nodiscard]] Eigen::Vector2d residual(const StretchFit& stretch, const Place& place,
                                          std::size_t fix,
                                          const Eigen::Vector2d& antenna_lidar) const {
@@ -184,14 +203,16 @@ class Stretches {
     return 1.0 / (1.0 + residual_m.squaredNorm() / (kernel_m_ * kernel_m_));
   }
 
-  /// Closed form in the plane, reweighted. Nothing where most fixes are off the way.
+  /// Closed form in the plane, reweighted. Nothing where fixes are off the way.
   [[nodiscard]] std::optional<StretchFit> fit(const std::vector<Place>& places, std::size_t stretch,
                                               const Eigen::Vector2d& antenna_lidar) const {
     constexpr int iterations = 4;
     std::vector<std::size_t> known;
     for (std::size_t i = begin(stretch); i < ends_[stretch]; ++i)
       if (places[i].is_known) known.push_back(i);
-    if (2 * known.size() < ends_[stretch] - begin(stretch)) return std::nullopt;
+    if (static_cast<double>(known.size()) <
+        min_known_share * static_cast<double>(ends_[stretch] - begin(stretch)))
+      return std::nullopt;
     std::vector<double> weights(known.size(), 1.0);
     StretchFit found;
     for (int iteration = 0; iteration < iterations; ++iteration) {
@@ -304,7 +325,7 @@ std::optional<Eigen::Vector3d> Stretches::variance_between(const std::vector<Red
 }
 
 std::optional<Stretches::Equations> Stretches::normal_equations(const GnssDelay& at) const {
-  const auto places = places_at(at.delay_s);
+  const auto places = moving_places_at(at.delay_s);
   std::vector<Reduced> stretches;
   Reduced all;
   for (std::size_t k = 0; k < ends_.size(); ++k) {
@@ -370,8 +391,8 @@ std::optional<GnssDelay> estimate_delay(std::span<const PlanPose> way,
   for (int k = -coarse; k <= coarse; ++k) gains.push_back(gain_of(k * coarse_step_s));
   // Who drives the same round again and again fits about as well a round later.
   const double total = gain(without, std::vector<double>(without.size(), 0.0));
-  const double least =
-      std::max({min_gain, min_gain_share * total, 0.5 * *std::ranges::max_element(gains)});
+  const double least = std::max({min_gain_of_fix * static_cast<double>(without.size()),
+                                 min_gain_share * total, 0.5 * *std::ranges::max_element(gains)});
   std::vector<Candidate> candidates{best_near(0.0, gain_of)};
   for (std::size_t k = 1; k + 1 < gains.size(); ++k) {
     if (gains[k] < least || gains[k] < gains[k - 1] || gains[k] < gains[k + 1]) continue;

@@ -129,6 +129,41 @@ TEST(GnssDelay, IsNotKnownWhereSpeedAndTurnAreTheSameAllTheTime) {
   }
 }
 
+/// The same by odometry that errs from scan to scan, and of a receiver that sees reflections for
+/// six seconds, by some metres.
+Heard driven_straight(unsigned seed, double sigma_m) {
+  constexpr Course street{[](double) { return 8.0; }, [](double) { return 0.0; }};
+  Heard heard = driven(street, 90.0, 0.0, sigma_m);
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  double heading_rad = 0.0;
+  Eigen::Vector2d off_m = Eigen::Vector2d::Zero();
+  for (std::size_t i = 1; i < heard.way.size(); ++i) {
+    heading_rad += 0.0003 * normal(random);
+    off_m += 0.0035 * Eigen::Vector2d(normal(random), normal(random));
+    off_m.y() += 0.8 * heading_rad;
+    heard.way[i].antenna_odom += off_m;
+    heard.way[i].axes_odom = Eigen::Rotation2D<double>(heading_rad) * heard.way[i].axes_odom;
+  }
+  const std::size_t first = 30 * (seed % 12), count = 30;
+  const Eigen::Vector2d reflected_m =
+      8.0 * sigma_m * Eigen::Vector2d(normal(random), normal(random));
+  for (std::size_t i = first; i < std::min(first + count, heard.fixes.size()); ++i)
+    heard.fixes[i].position_enu += reflected_m;
+  return heard;
+}
+
+TEST(GnssDelay, OnAStraightWayTheNoiseOfOdometryTellsNothing) {
+  for (const double sigma_m : {0.02, 1.5}) {
+    for (unsigned seed = 0; seed < 24; ++seed) {
+      const Heard heard = driven_straight(seed, sigma_m);
+      const auto found = estimate_delay(heard.way, heard.fixes);
+      EXPECT_TRUE(!found || !revised({}, *found))
+          << sigma_m << " m, " << seed << ": " << found->delay_s << " +- " << found->sigma_s;
+    }
+  }
+}
+
 // An estimate that is less sure than the one before it says nothing against that.
 TEST(GnssDelay, IsKeptUntilItIsContradicted) {
   const GnssDelay known{.delay_s = 0.3, .sigma_s = 0.02, .antenna_lidar = {1.0, 0.5}};
