@@ -1,6 +1,5 @@
 #include "clients/commands/command.hpp"
 
-#include <filesystem>
 #include <iostream>
 #include <stdexcept>
 
@@ -22,12 +21,9 @@ ExitCode report(const std::exception& error, ExitCode code) {
   return code;
 }
 
-/// Of a file that could not be written: one in a folder that is none was never asked for rightly.
-ExitCode code_of_unwritten(const std::filesystem::path& file) {
-  std::error_code ignored;
-  const std::filesystem::path folder = file.parent_path();
-  const bool has_folder = folder.empty() || std::filesystem::is_directory(folder, ignored);
-  return has_folder ? ExitCode::failed : ExitCode::bad_input;
+/// Of a file that could not be written: one in a folder that was none was never asked for rightly.
+ExitCode code_of_unwritten(bool had_folder) {
+  return had_folder ? ExitCode::failed : ExitCode::bad_input;
 }
 
 }  // namespace
@@ -50,9 +46,9 @@ ExitCode run_action(const Action& action) {
     const bool is_input = error.code() == wire::ReplyCode::invalid_request;
     return report(error, is_input ? ExitCode::bad_input : ExitCode::failed);
   } catch (const DatasetWriteError& error) {
-    return report(error, code_of_unwritten(error.file()));
+    return report(error, code_of_unwritten(error.had_folder()));
   } catch (const MapFileWriteError& error) {
-    return report(error, code_of_unwritten(error.file()));
+    return report(error, code_of_unwritten(error.had_folder()));
   } catch (const DatasetError& error) {
     return report(error, ExitCode::bad_input);
   } catch (const ConfigError& error) {

@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/process/folder_of_file.hpp"
+
 namespace stillmap {
 
 /// A dataset file that cannot be read or written. what() names the file, the fault and the remedy.
@@ -23,11 +25,13 @@ class CameraUnknownError : public DatasetError {
 class DatasetWriteError : public DatasetError {
  public:
   DatasetWriteError(const std::filesystem::path& file, const std::string& fault)
-      : DatasetError(file, fault), file_(file) {}
-  [[nodiscard]] const std::filesystem::path& file() const { return file_; }
+      : DatasetError(file, fault), had_folder_(is_folder_there(file)) {}
+  /// Whether its folder was there: where not, the name is wrong. It may be gone by now, as that of
+  /// a run that failed.
+  [[nodiscard]] bool had_folder() const { return had_folder_; }
 
  private:
-  std::filesystem::path file_;
+  bool had_folder_;
 };
 
 }  // namespace stillmap

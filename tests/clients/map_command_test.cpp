@@ -475,6 +475,15 @@ TEST_F(MapCommandTest, ARunIsResumedAsItBegan) {
   EXPECT_EQ(line_count("out/poses_lidar.txt"), 12U);
 }
 
+TEST_F(MapCommandTest, AFullDiskIsNoFaultOfWhatWasAskedFor) {
+  simulate("city", 6);
+  BackgroundProcess full("sh -c 'ulimit -f 64; exec " + stillmap_program() + " map " +
+                             path("city") + " --labels none --out " + path("out") + "'",
+                         folder_ / "log");
+  EXPECT_EQ(full.wait(), 1);
+  EXPECT_THAT(content("log"), HasSubstr("cannot be written"));
+}
+
 TEST_F(MapCommandTest, ADeniedLoopIsOfScansThatThereAre) {
   simulate("city", 3);
   const ProcessResult refused = map_city("--deny-loop 1:5000");

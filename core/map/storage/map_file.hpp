@@ -12,6 +12,7 @@
 #include "core/map/static_map.hpp"
 #include "core/map/tile.hpp"
 #include "core/map/tile_evidence.hpp"
+#include "core/process/folder_of_file.hpp"
 
 namespace stillmap {
 
@@ -33,11 +34,13 @@ class UnusableMapFileError : public MapFileError {
 class MapFileWriteError : public MapFileError {
  public:
   MapFileWriteError(const std::filesystem::path& file, const std::string& fault)
-      : MapFileError(file, fault), file_(file) {}
-  [[nodiscard]] const std::filesystem::path& file() const { return file_; }
+      : MapFileError(file, fault), had_folder_(is_folder_there(file)) {}
+  /// Whether its folder was there: where not, the name is wrong. It may be gone by now, as that of
+  /// a run that failed.
+  [[nodiscard]] bool had_folder() const { return had_folder_; }
 
  private:
-  std::filesystem::path file_;
+  bool had_folder_;
 };
 
 /// Metadata key of a map that was saved at the end of its run: nothing that was mapped is missing.
