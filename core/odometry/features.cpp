@@ -243,10 +243,22 @@ std::vector<std::uint32_t> some_of(const std::vector<std::uint32_t>& all, std::s
 /// Spacing of the points of any kind in the local map [m].
 constexpr double map_point_spacing_m = 0.5;
 
-/// Points of any kind for the alignment of points, from those of the map's spacing.
-void pick_points(const Scan& scan, std::vector<std::uint32_t> spaced,
+/// The share of all spacings that leaves enough surfaces where all is near, as in a lift, of which
+/// the usual ones leave `count`: few hold no pose. 1 where these thin little more than the lidar
+/// itself does. (Features of few rings do without: closer together they lie well on wrong walls.)
+double spacing_share(std::size_t count, const Scan& scan) {
+  constexpr double enough = 400.0;
+  constexpr std::size_t min_thinning = 4;
+  constexpr double min_share = 0.3;
+  if (min_thinning * count > scan.size()) return 1.0;
+  return std::clamp(std::sqrt(static_cast<double>(count) / enough), min_share, 1.0);
+}
+
+/// Points of any kind for the alignment of points, from those of the map's spacing, all spacings
+/// times `share`.
+void pick_points(const Scan& scan, std::vector<std::uint32_t> spaced, double share,
                  const Eigen::Vector3f& up_lidar, Features& features) {
-  constexpr double spacing_m = 1.0;
+  const double spacing_m = 2.0 * map_point_spacing_m * share;
   constexpr std::size_t max_upright = 800;
   constexpr std::size_t max_level = 300;
   features.points = std::move(spaced);
@@ -276,19 +288,25 @@ Features extract_surfaces(const Scan& scan, const FeatureConfig& config,
                           const Eigen::Vector3f& up_lidar) {
   const std::vector<std::uint32_t> all = solid_points(scan, points_in_air(scan.points_lidar));
   Features features;
-  features.planes = voxel_downsample(scan.points_lidar, all, config.map_surface_spacing_m);
-  features.surfaces =
-      voxel_downsample(scan.points_lidar, features.planes, config.surface_spacing_m);
+  const auto thin_out = [&](double share) {
+    features.planes =
+        voxel_downsample(scan.points_lidar, all, share * config.map_surface_spacing_m);
+    features.surfaces =
+        voxel_downsample(scan.points_lidar, features.planes, share * config.surface_spacing_m);
+  };
+  thin_out(1.0);
+  const double share = spacing_share(features.surfaces.size(), scan);
+  if (share < 1.0) thin_out(share);
   const ColumnHeights columns(scan.points_lidar, features.planes, up_lidar);
   features.is_level.resize(scan.size());
   for (const std::uint32_t i : features.surfaces)
     features.is_level[i] = !columns.stands_up(scan.points_lidar[i]);
   const bool are_points_spaced = config.surface_spacing_m == map_point_spacing_m;
   pick_points(scan,
-              are_points_spaced
-                  ? features.surfaces
-                  : voxel_downsample(scan.points_lidar, features.planes, map_point_spacing_m),
-              up_lidar, features);
+              are_points_spaced ? features.surfaces
+                                : voxel_downsample(scan.points_lidar, features.planes,
+                                                   share * map_point_spacing_m),
+              share, up_lidar, features);
   return features;
 }
 
@@ -317,7 +335,7 @@ Features extract_features(const Scan& scan, const FeatureConfig& config,
   features.registered_planes =
       voxel_downsample(scan.points_lidar, features.planes, config.plane_spacing_m);
   const std::vector<std::uint32_t> all = solid_points(scan, in_air);
-  pick_points(scan, voxel_downsample(scan.points_lidar, all, map_point_spacing_m), up_lidar,
+  pick_points(scan, voxel_downsample(scan.points_lidar, all, map_point_spacing_m), 1.0, up_lidar,
               features);
   return features;
 }
