@@ -43,11 +43,14 @@ bool MotionTrust::is_reachable(const Motion& last, const Eigen::Isometry3d& moti
          limits_.max_acceleration_m_s2 * between_middles_s * interval_s + noise_m;
 }
 
+void MotionTrust::forget_motion() {
+  if (!std::exchange(foretold_, std::nullopt) || ++untold_ != max_untold || is_believed_) return;
+  is_believed_ = true;
+  missed_ = missed_by_repetition_ = 0.0;
+}
+
 bool MotionTrust::is_possible(const Eigen::Isometry3d& foretold, double interval_s) {
-  if (std::exchange(foretold_, std::nullopt) && ++untold_ == max_untold && !is_believed_) {
-    is_believed_ = true;
-    missed_ = missed_by_repetition_ = 0.0;
-  }
+  forget_motion();
   if (!(interval_s > 0.0)) return true;
   const auto last_foretold = std::exchange(last_foretold_, Motion{foretold, interval_s});
   const bool is_known = registered_ || last_foretold;

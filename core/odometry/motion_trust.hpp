@@ -22,7 +22,7 @@ class MotionTrust {
   /// What was registered where the last one that was possible was foretold, or nothing was.
   void learn(const Eigen::Isometry3d& registered, double interval_s);
   /// Nobody knows how the lidar moved.
-  void forget_motion() { foretold_.reset(); }
+  void forget_motion();
 
   [[nodiscard]] bool is_believed() const { return is_believed_; }
 

@@ -67,6 +67,17 @@ TEST_F(MotionTrusts, TrustComesBackWhereNothingTells) {
   EXPECT_TRUE(trust_.is_believed());
 }
 
+TEST_F(MotionTrusts, ItComesBackWhereEveryMotionIsForgottenBeforeTheNext) {
+  drive(20, 0.5, 0.5);
+  drive(10, 0.5, 0.0);
+  ASSERT_FALSE(trust_.is_believed());
+  for (int i = 0; i < 22; ++i) {
+    trust_.forget_motion();
+    EXPECT_TRUE(trust_.is_possible(ahead(0.0), interval_s));
+  }
+  EXPECT_TRUE(trust_.is_believed());
+}
+
 TEST_F(MotionTrusts, WhatIsBorneGrowsWithTheTimeBetweenScans) {
   for (int i = 0; i < 20; ++i) {
     EXPECT_TRUE(trust_.is_possible(ahead(5.15), 0.5));
