@@ -16,6 +16,7 @@
 #include "core/map/map_id.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "core/mapper.hpp"
+#include "core/odometry/motion_trust.hpp"
 
 namespace stillmap::python {
 namespace {
@@ -51,7 +52,26 @@ Eigen::Isometry3d mount_of(const ServerConfig& config, const std::filesystem::pa
 /// A mapper that threads use one after the other.
 class SharedMapper {
  public:
-  explicit SharedMapper(std::unique_ptr<Mapper> mapper) : mapper_(std::move(mapper)) {}
+  SharedMapper(std::unique_ptr<Mapper> mapper, const MotionLimits& limits)
+      : mapper_(std::move(mapper)), trust_(limits) {}
+
+  /// Maps a scan from where a prior has it, as long as priors foretell what is registered. Where
+  /// nobody knows where the lidar is, they are believed.
+  std::optional<MappedScan> process(const Scan& scan,
+                                    const std::optional<Eigen::Isometry3d>& T_map_lidar_prior) {
+    const py::gil_scoped_release released;
+    const std::scoped_lock lock(mutex_);
+    const bool is_used = T_map_lidar_prior && is_believed(scan.stamp_ns, *T_map_lidar_prior);
+    auto mapped = mapper_->process(scan, is_used ? T_map_lidar_prior : std::nullopt);
+    if (mapped) learn(*mapped);
+    return mapped;
+  }
+  void reset() {
+    const py::gil_scoped_release released;
+    const std::scoped_lock lock(mutex_);
+    mapper_->reset(new_map_id());
+    last_.reset();
+  }
 
   /// What `use(Mapper&)` returns. Python goes on meanwhile, and must not be used in it.
   template <typename Use>
@@ -62,8 +82,27 @@ class SharedMapper {
   }
 
  private:
+  [[nodiscard]] bool is_believed(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map_lidar) {
+    trust_.forget_motion();
+    return !last_ || (trust_.is_possible(last_->T_map_lidar.inverse() * T_map_lidar,
+                                         1e-9 * static_cast<double>(stamp_ns - last_->stamp_ns)) &&
+                      trust_.is_believed());
+  }
+  void learn(const MappedScan& mapped) {
+    const StampedPose now{mapped.labelled.scan.stamp_ns, mapped.odometry.T_map_lidar};
+    const OdometryHealth health = mapped.odometry.health;
+    if (health == OdometryHealth::lost) return last_.reset();
+    if (last_ && health == OdometryHealth::good)
+      trust_.learn(last_->T_map_lidar.inverse() * now.T_map_lidar,
+                   1e-9 * static_cast<double>(now.stamp_ns - last_->stamp_ns));
+    last_ = now;
+  }
+
   std::unique_ptr<Mapper> mapper_;
   std::mutex mutex_;
+  MotionTrust trust_;
+  /// The last pose; nothing before the first, and where the lidar is lost.
+  std::optional<StampedPose> last_;
 };
 
 std::unique_ptr<SharedMapper> make_mapper(const SensorModel& sensor, const std::string& labels,
@@ -82,14 +121,14 @@ std::unique_ptr<SharedMapper> make_mapper(const SensorModel& sensor, const std::
       config.mapper,
       open_segmenter(labels_from(config.labels, labels), sensor, false, T_base_lidar));
   mapper->reset(new_map_id());
-  return std::make_unique<SharedMapper>(std::move(mapper));
+  return std::make_unique<SharedMapper>(std::move(mapper), sensor.motion_limits);
 }
 
 std::optional<MappedScan> process(SharedMapper& shared, const DatasetFrame& frame,
                                   const std::optional<InArray<double>>& T_map_lidar_prior) {
   std::optional<Eigen::Isometry3d> prior;
   if (T_map_lidar_prior) prior = transform_from(*T_map_lidar_prior, "T_map_lidar_prior");
-  return shared.with([&](Mapper& mapper) { return mapper.process(frame.scan, prior); });
+  return shared.process(frame.scan, prior);
 }
 
 Map current_map(Mapper& mapper) {
@@ -175,9 +214,12 @@ void bind_mapper(py::module_& module) {
            "\"model\" (the network that comes with Stillmap), or a folder with a model. config: a "
            "server file whose mapper settings are used, and whose mount tells the network how the "
            "lidar leans. Raises ConfigError, ValueError.")
-      .def("process", &process, py::arg("scan"), py::arg("T_map_lidar_prior") = py::none(),
-           "Maps a Scan. T_map_lidar_prior: (4, 4), replaces the constant-velocity prediction. "
-           "None for a scan that cannot be mapped; last_rejection says why.")
+      .def(
+          "process", &process, py::arg("scan"), py::arg("T_map_lidar_prior") = py::none(),
+          "Maps a Scan. T_map_lidar_prior: (4, 4), where another odometry has the lidar, replaces "
+          "the constant-velocity prediction as long as such poses foretell what is registered, and "
+          "are no jumps; any does at the start, and after a scan that was lost. "
+          "None for a scan that cannot be mapped; last_rejection says why.")
       .def_property_readonly("last_rejection",
                              [](SharedMapper& shared) {
                                return shared.with([](const Mapper& mapper) {
@@ -188,10 +230,7 @@ void bind_mapper(py::module_& module) {
            py::arg("acceleration_imu"),
            "A sample of the IMU [rad/s, m/s^2], before the scans that end after it.")
       .def(
-          "reset",
-          [](SharedMapper& shared) {
-            shared.with([](Mapper& mapper) { mapper.reset(new_map_id()); });
-          },
+          "reset", [](SharedMapper& shared) { shared.reset(); },
           "Begins a new map at the next scan, whose pose is its origin; the lidar goes on as it "
           "moved.")
       .def_property_readonly(

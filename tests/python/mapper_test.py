@@ -124,6 +124,32 @@ def test_other_threads_run_meanwhile(city):
     assert ticks > 3 * len(dataset)
 
 
+def test_a_prior_that_jumps_or_stands_still_is_not_followed(city):
+    dataset = stillmap.open_dataset(city)
+    plain = stillmap.Mapper(dataset.sensor, labels="scan")
+    expected = [plain.process(scan).T_map_lidar for scan in dataset]
+
+    def poses(prior_of):
+        mapper = stillmap.Mapper(dataset.sensor, labels="scan")
+        found = []
+        for k, scan in enumerate(dataset):
+            prior = prior_of(k, found) if found else None
+            mapped = mapper.process(scan, prior)
+            assert mapped.health != "lost", k
+            found.append(mapped.T_map_lidar)
+        return found
+
+    def jumps_once(k, found):
+        if k != 6:
+            return None
+        return found[-1] @ np.block([[np.eye(3), np.array([[30.0], [20.0], [0.0]])],
+                                     [np.zeros((1, 3)), np.ones((1, 1))]])
+
+    np.testing.assert_array_equal(poses(jumps_once), expected)
+    # A dead encoder: believed at first, and found out.
+    np.testing.assert_allclose(poses(lambda k, found: found[-1]), expected, atol=0.05)
+
+
 def test_a_prior_must_be_finite():
     prior = np.eye(4)
     prior[0, 3] = np.nan
