@@ -4,14 +4,18 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
 #include <system_error>
 #include <utility>
+#include <vector>
 
+#include "core/lidar/measured_elevation.hpp"
 #include "core/lidar/range_image.hpp"
+#include "core/segmentation/beam_origin.hpp"
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/network_input.hpp"
 
@@ -50,6 +54,26 @@ std::optional<double> height_above_ground_m(const Eigen::Isometry3d& T_base_lida
   const double height_m = T_base_lidar.translation().z();
   if (height_m < lowest_m || height_m > highest_m) return std::nullopt;
   return height_m;
+}
+
+/// Lowest and highest elevation [rad], but for one point in a thousand at either end. Nothing where
+/// they lie too close together for an image.
+std::optional<std::pair<double, double>> field_of_view(std::span<const Eigen::Vector3f> points) {
+  constexpr double least_rad = 0.02;
+  std::vector<double> elevations;
+  for (const Eigen::Vector3f& p : points) {
+    const double elevation = measured_elevation(p);
+    if (std::isfinite(elevation)) elevations.push_back(elevation);
+  }
+  if (elevations.empty()) return std::nullopt;
+  const auto at = [&](std::size_t place) {
+    const auto middle = elevations.begin() + static_cast<std::ptrdiff_t>(place);
+    std::ranges::nth_element(elevations, middle);
+    return *middle;
+  };
+  const std::size_t cut = elevations.size() / 1000;
+  const std::pair field(at(cut), at(elevations.size() - 1 - cut));
+  return field.second - field.first > least_rad ? std::optional(field) : std::nullopt;
 }
 
 PointLabels labels_of_own_pixel(const RangeImage& image, const PixelLabels& pixels) {
@@ -171,24 +195,57 @@ std::unique_ptr<SegmentationNetwork> NetworkSegmenter::take_one_threaded(std::si
   }
 }
 
+/// How the network is shown a scan.
+struct NetworkSegmenter::View {
+  /// Empty: as the scan has them.
+  std::vector<Eigen::Vector3f> moved_points;
+  /// Whether the image is one of these.
+  bool moves_image = false;
+  ProjectionModel projection;
+  /// See raised_m().
+  float raised_m = 0.0F;
+};
+
+NetworkSegmenter::View NetworkSegmenter::view_of(const Scan& scan, const Mount& mount) const {
+  View view{.moved_points = {},
+            .moves_image = false,
+            .projection = model_.projection(),
+            .raised_m = raised_m(mount)};
+  if (!mount.tilt.is_upright()) {
+    view.moved_points = mount.tilt.turned(scan.points_lidar);
+    // An image of fixed size is that of the published projection: what a turned one shows would not
+    // fit into its field of view.
+    if (!model_.follow_sensor) return view;
+    view.projection = mount.tilt.widened(view.projection);
+    view.moves_image = mount.tilt.turns_image();
+    return view;
+  }
+  if (!model_.follow_sensor || !model_.lidar_height_m || mount.height_m) return view;
+  const auto height_m = lidar_height_over_origin(scan.points_lidar, *model_.lidar_height_m);
+  if (!height_m) return view;
+  for (const Eigen::Vector3f& p : scan.points_lidar)
+    view.moved_points.emplace_back(p.x(), p.y(), p.z() - static_cast<float>(*height_m));
+  if (const auto field = field_of_view(view.moved_points)) {
+    view.projection.fov_down = field->first;
+    view.projection.fov_up = field->second;
+  }
+  view.moves_image = true;
+  view.raised_m = static_cast<float>(*height_m - *model_.lidar_height_m);
+  return view;
+}
+
 PointLabels NetworkSegmenter::segment_with(SegmentationNetwork& network, int columns,
                                            const Mount& mount, const Scan& scan) const {
-  const LidarTilt& tilt = mount.tilt;
-  std::vector<Eigen::Vector3f> turned;
-  if (!tilt.is_upright()) turned = tilt.turned(scan.points_lidar);
-  const std::span<const Eigen::Vector3f> points = turned.empty() ? scan.points_lidar : turned;
-  ProjectionModel projection = model_.projection();
-  if (model_.follow_sensor) projection = tilt.widened(projection);
-  projection.columns = columns;
-  // An image of fixed size is that of the published projection: what a turned one shows would not
-  // fit into its field of view.
-  const bool turns_image = model_.follow_sensor && tilt.turns_image();
-  const RangeImage image(turns_image ? points : scan.points_lidar, projection);
+  View view = view_of(scan, mount);
+  view.projection.columns = columns;
+  const std::span<const Eigen::Vector3f> points =
+      view.moved_points.empty() ? scan.points_lidar : view.moved_points;
+  const RangeImage image(view.moves_image ? points : scan.points_lidar, view.projection);
   std::optional<RangeImage> filled;
   if (model_.follow_sensor && image.share_in_gaps(max_gap) > max_share_in_gaps)
     filled = image.with_gaps_filled(max_gap);
-  PixelOutputs outputs = network.run(make_network_input(
-      points, scan.intensity, filled ? *filled : image, model_, raised_m(mount)));
+  PixelOutputs outputs = network.run(
+      make_network_input(points, scan.intensity, filled ? *filled : image, model_, view.raised_m));
   const PixelLabels pixels = pixel_labels(std::move(outputs), model_);
   PointLabels labels =
       model_.knn ? knn_labels(image, pixels, *model_.knn) : labels_of_own_pixel(image, pixels);

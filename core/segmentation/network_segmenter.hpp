@@ -63,6 +63,8 @@ class NetworkSegmenter final : public Segmenter {
     std::optional<double> height_m;
   };
 
+  struct View;
+  [[nodiscard]] View view_of(const Scan& scan, const Mount& mount) const;
   [[nodiscard]] PointLabels segment_with(SegmentationNetwork& network, int columns,
                                          const Mount& mount, const Scan& scan) const;
   /// What brings z to the heights that the model has seen [m].

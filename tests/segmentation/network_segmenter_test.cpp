@@ -220,6 +220,46 @@ TEST(NetworkSegmenter, FillsTheGapsOfALidarThatFiresAtFewerAzimuthsThanTheImageH
   EXPECT_EQ(seen, 32U) << "an image of fixed size is the published one";
 }
 
+/// Keeps the lowest height that the last image showed, as the network has it.
+class KeepsLowest final : public SegmentationNetwork {
+ public:
+  KeepsLowest(const InputStatistics& statistics, float& lowest_m)
+      : statistics_(statistics), lowest_m_(lowest_m) {}
+  PixelOutputs run(std::span<const float> input) override {
+    const std::size_t pixels = input.size() / plain_input_channels;
+    const auto heights = input.subspan(index(InputChannel::z) * pixels, pixels);
+    lowest_m_ = std::ranges::min(heights) * statistics_.deviation[index(InputChannel::z)] +
+                statistics_.mean[index(InputChannel::z)];
+    return {.output = std::vector<std::uint8_t>(pixels, 9),
+            .confidence = std::vector(pixels, 1.0F)};
+  }
+  std::vector<float> probabilities(std::span<const float> /*input*/) override { return {}; }
+  [[nodiscard]] std::string engine() const override { return "keeps lowest"; }
+
+ private:
+  InputStatistics statistics_;
+  float& lowest_m_;
+};
+
+TEST(NetworkSegmenter, SeesACloudInTheFrameOfTheRobotFromWhereItsBeamsStart) {
+  // A floor of 30 m x 30 m, from its middle in the frame of a robot on it, and walls around it.
+  Scan scan;
+  for (int x = -30; x <= 30; ++x)
+    for (int y = -30; y <= 30; ++y)
+      scan.points_lidar.emplace_back(0.5F * static_cast<float>(x), 0.5F * static_cast<float>(y),
+                                     std::abs(x) == 30 ? 0.05F * static_cast<float>(y + 31) : 0.0F);
+  ModelDescription model = describe(random_network(8, 64, 20));
+  model.follow_sensor = true;
+  model.lidar_height_m = 1.5;
+  float lowest_m = 0.0F;
+  NetworkSegmenter labels(model, std::make_unique<KeepsLowest>(model.statistics, lowest_m));
+  static_cast<void>(labels.segment(scan));
+  EXPECT_NEAR(lowest_m, -1.5F, 0.01F);
+  labels.set_mount(Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, 1.5)));
+  static_cast<void>(labels.segment(scan));
+  EXPECT_GT(lowest_m, -1.2F) << "what is told is believed";
+}
+
 TEST(NetworkSegmenter, UsesTheResolutionLevelThatIsSet) {
   NetworkSegmenter labels(describe(random_network(2, 32, 20)), std::make_unique<OneClass>(64U, 9));
   EXPECT_EQ(labels.relative_costs(), std::vector{1.0});
