@@ -179,7 +179,7 @@ struct Unit {
 constexpr std::array<Unit, 3> smaller_units{{{TimesUnit::milliseconds, 1'000},
                                              {TimesUnit::microseconds, 1'000'000},
                                              {TimesUnit::nanoseconds, 1'000'000'000}}};
-constexpr std::int64_t ns_per_s = 1'000'000'000;
+constexpr std::int64_t ns_of_a_second = 1'000'000'000;
 
 /// Whether times as these, from scan to scan, are those of a lidar.
 bool is_period(double seconds) { return seconds >= 0.02 && seconds <= 2.0; }
@@ -214,7 +214,7 @@ std::optional<KittiTimes> large_times(std::span<const std::string> lines) {
   const double step = median_step(*numbers);
   for (const auto [unit, to_a_second] : smaller_units) {
     if (!is_period(step / static_cast<double>(to_a_second))) continue;
-    const std::int64_t ns = ns_per_s / to_a_second;
+    const std::int64_t ns = ns_of_a_second / to_a_second;
     const std::int64_t largest = std::numeric_limits<std::int64_t>::max() / ns;
     if (std::ranges::any_of(*numbers, [&](auto n) { return n > largest || n < -largest; }))
       return std::nullopt;
