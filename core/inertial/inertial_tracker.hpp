@@ -20,7 +20,8 @@ struct InertialCounts {
   std::uint64_t not_usable = 0;
   std::uint64_t out_of_order = 0;
   /// Scans whose rotation the IMU told; that samples were missing for, as they came too late, had a
-  /// gap or said the same again and again; and whose rotation it was not believed to tell.
+  /// gap, said the same again and again or were at the end of the gyro's range; and whose rotation
+  /// it was not believed to tell.
   std::uint64_t scans_helped = 0;
   std::uint64_t scans_without_samples = 0;
   std::uint64_t scans_not_believed = 0;
