@@ -152,7 +152,7 @@ class LoopCloser {
   };
   [[nodiscard]] PositionCounts position_counts() const;
   /// Whether too many of them contradict odometry for any to be used.
-  [[nodiscard]] bool are_positions_refused() const { return refused_positions_ > 0; }
+  [[nodiscard]] bool are_positions_refused() const;
   /// Poses of all scans added so far, corrected. Without closures and positions: as they were.
   [[nodiscard]] std::vector<Eigen::Isometry3d> corrected_poses() const;
   /// The same with these poses of the graph's nodes, in whatever frame they are.

@@ -48,6 +48,15 @@ LoopCloser::PositionCounts LoopCloser::position_counts() const {
   return {.used = graph_.positions.size() + others, .in_doubt = positions_in_doubt() + others};
 }
 
+bool LoopCloser::are_positions_refused() const {
+  if (refused_positions_ > 0) return true;
+  // They make no chain that is long enough to say where the map lies.
+  const std::size_t others = positions_.disbelieved();
+  return !T_enu_map_ && others >= config_.earth.min_points &&
+         static_cast<double>(others) >
+             config_.max_unused_share * static_cast<double>(others + positions_.believed_count());
+}
+
 std::size_t LoopCloser::positions_in_doubt() const {
   return static_cast<std::size_t>(
       std::ranges::count_if(graph_.positions, [&](const PositionMeasurement& position) {

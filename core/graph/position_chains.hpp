@@ -23,10 +23,17 @@ struct PositionOnWay {
 /// Of the horizontal standard deviation of a measured position [m].
 [[nodiscard]] double horizontal_sigma_m(const Eigen::Matrix3d& covariance_enu);
 
+/// Of which of these positions, in the order of their way, the heights follow each other as
+/// odometry has them, whichever way it has up: those of the largest such chain. None where that is
+/// less than half of them. A receiver's height may jump where its place does not.
+[[nodiscard]] std::vector<bool> believed_heights(std::span<const PositionOnWay> positions);
+
 /// Sorts measured positions by what they say of the way between them: those that follow each other
 /// as far apart as odometry has them are a chain. A receiver that holds its last position, or sees
 /// reflections, says of the way what is not so, or what nothing before it goes on to; most of what
-/// it says does not. The largest chain is believed.
+/// it says does not. One goes on where the newest chain is that it can: what is off by the same
+/// since some moment stays a chain of its own, however long the way since then. The largest chain
+/// is believed; where heights of it are not, they are unknown.
 class PositionChains {
  public:
   /// Of one chain, positions count once on so much way, and once on so many of their standard
@@ -41,14 +48,21 @@ class PositionChains {
   /// Those of the largest chain. The newest one may still be replaced by a better one, until this
   /// is called.
   [[nodiscard]] std::span<const PositionMeasurement> believed();
+  /// How many they are.
+  [[nodiscard]] std::size_t believed_count() const {
+    return chains_.empty() ? 0 : chains_.front().positions.size();
+  }
   /// Positions of other chains.
   [[nodiscard]] std::size_t disbelieved() const;
 
  private:
   struct Chain {
-    std::vector<PositionMeasurement> positions;
-    PositionOnWay last;
+    std::vector<PositionOnWay> positions;
+
+    [[nodiscard]] const PositionOnWay& last() const { return positions.back(); }
   };
+  /// The chain that the position goes on; the end of them where it begins one.
+  [[nodiscard]] std::vector<Chain>::iterator chain_before(const PositionOnWay& position);
   void extend(Chain& chain, const PositionOnWay& position) const;
 
   double spacing_m_;
@@ -58,6 +72,8 @@ class PositionChains {
   std::size_t dropped_ = 0;
   /// Positions of the largest chain that are in use.
   std::size_t used_ = 0;
+  /// Those of the last call of believed().
+  std::vector<PositionMeasurement> believed_;
 };
 
 }  // namespace stillmap

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <random>
+#include <span>
 
 namespace stillmap {
 namespace {
@@ -37,8 +39,16 @@ PositionChains chains_of(const std::function<Eigen::Vector3d(int, const Eigen::V
   return chains;
 }
 
+/// How many of them say how high they are.
+std::size_t heights(std::span<const PositionMeasurement> positions) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      positions,
+      [](const PositionMeasurement& position) { return position.information(2, 2) > 1e-4; }));
+}
+
 TEST(PositionChains, AllOfAGoodReceiverAreOne) {
   PositionChains chains = chains_of([](int, const Eigen::Vector3d& p) { return p; });
+  EXPECT_EQ(heights(chains.believed()), chains.believed().size());
   EXPECT_GE(chains.believed().size(), 55U);
   EXPECT_LE(chains.disbelieved(), 3U);
 }
@@ -66,6 +76,39 @@ TEST(PositionChains, WhatIsSaidBeforeTheReceiverIsRightIsNotBelieved) {
   EXPECT_GE(chains.believed()[2].node, 150U);
 }
 
+TEST(PositionChains, WhatIsOffByTheSameSinceSomeMomentIsAnotherOne) {
+  PositionChains chains = chains_of([](int k, const Eigen::Vector3d& p) {
+    return (k < 350 ? p : p + Eigen::Vector3d(-2.0, 12.0, 0.0)).eval();
+  });
+  EXPECT_GE(chains.believed().size(), 30U);
+  EXPECT_LT(chains.believed().back().node, 350U);
+}
+
+TEST(PositionChains, AStepInHeightTakesHeightsAlone) {
+  for (const double step_m : {-20.0, 10.0}) {
+    PositionChains chains = chains_of([&](int k, const Eigen::Vector3d& p) {
+      return (k < 350 ? p : p + Eigen::Vector3d(0.0, 0.0, step_m)).eval();
+    });
+    const auto believed = chains.believed();
+    EXPECT_GE(believed.size(), 55U) << step_m;
+    EXPECT_GE(heights(believed), 30U) << step_m;
+    for (const PositionMeasurement& position : believed) {
+      const bool is_known = position.information(2, 2) > 1e-4;
+      EXPECT_EQ(is_known, position.node < 350) << step_m;
+      // Where the others would have it, so that it does not mislead what begins from there.
+      EXPECT_NEAR(position.position_enu.z(), 0.0, 4.0) << step_m;
+    }
+  }
+}
+
+TEST(PositionChains, HeightsThatJumpAllTheTimeAreNotBelieved) {
+  PositionChains chains = chains_of([](int k, const Eigen::Vector3d& p) {
+    return (p + Eigen::Vector3d(0.0, 0.0, 25.0 * ((k / 10) % 7))).eval();
+  });
+  EXPECT_GE(chains.believed().size(), 55U);
+  EXPECT_EQ(heights(chains.believed()), 0U);
+}
+
 // Without an IMU a map is as level as its first scan's lidar was.
 TEST(PositionChains, OdometryMayBeTiltedAndATenthTooLong) {
   for (const double tilt_rad : {0.0, 0.5, 1.5}) {
@@ -78,6 +121,7 @@ TEST(PositionChains, OdometryMayBeTiltedAndATenthTooLong) {
         chains.add(position);
       }
       EXPECT_EQ(chains.disbelieved(), 0U) << tilt_rad << " rad, " << scale;
+      EXPECT_EQ(heights(chains.believed()), chains.believed().size()) << tilt_rad;
     }
   }
 }
