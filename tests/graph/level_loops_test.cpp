@@ -83,7 +83,7 @@ struct Closures {
   double worst_m = 0.0;
 };
 
-Closures close(const BoxWorld& world, const std::vector<Eigen::Isometry3d>& poses) {
+Closures closures_of(const BoxWorld& world, const std::vector<Eigen::Isometry3d>& poses) {
   LoopCloser closer{LoopClosingConfig{}};
   for (std::size_t k = 0; k < poses.size(); ++k)
     closer.add(world.scan_at(poses[k], k + 1), poses[k], true);
@@ -152,7 +152,7 @@ TEST(LoopsOnLevels, ABridgeIsNotTheStreetThatLeadsUnderIt) {
   drive(poses, {0, -60, low_m}, {0, -14, deck_m});
   drive(poses, {0, -13, deck_m}, {0, 14, deck_m});
   drive(poses, {0, 15, deck_m}, {0, 60, low_m});
-  EXPECT_LT(close(world, poses).worst_m, 0.3);
+  EXPECT_LT(closures_of(world, poses).worst_m, 0.3);
 }
 
 /// Storeys of the same walls, pillars and stairs, with other cars on each; houses round them.
@@ -192,7 +192,7 @@ BoxWorld car_park(std::uint64_t seed, int storeys) {
   return world;
 }
 
-void round(std::vector<Eigen::Isometry3d>& poses, double z) {
+void drive_round(std::vector<Eigen::Isometry3d>& poses, double z) {
   drive(poses, {6, 7, z}, {54, 7, z});
   drive(poses, {54, 8, z}, {54, 27, z});
   drive(poses, {53, 27, z}, {6, 27, z});
@@ -202,19 +202,19 @@ void round(std::vector<Eigen::Isometry3d>& poses, double z) {
 TEST(LoopsOnLevels, StoreysOfACarParkAreNotOneAnother) {
   const BoxWorld world = car_park(4, 2);
   std::vector<Eigen::Isometry3d> poses;
-  round(poses, 0.0);
+  drive_round(poses, 0.0);
   drive_away(poses, 500);
-  round(poses, 3.0);
-  EXPECT_LT(close(world, poses).worst_m, 0.3);
+  drive_round(poses, 3.0);
+  EXPECT_LT(closures_of(world, poses).worst_m, 0.3);
 }
 
 TEST(LoopsOnLevels, StoreysThatAreKnownAreFoundAgain) {
   const BoxWorld world = car_park(4, 3);
   std::vector<Eigen::Isometry3d> poses;
-  for (int storey = 0; storey < 3; ++storey) round(poses, 3.0 * storey);
+  for (int storey = 0; storey < 3; ++storey) drive_round(poses, 3.0 * storey);
   drive_away(poses, 500);
-  round(poses, 3.0);
-  const Closures found = close(world, poses);
+  drive_round(poses, 3.0);
+  const Closures found = closures_of(world, poses);
   EXPECT_LT(found.worst_m, 0.3);
   EXPECT_GE(found.count, 2U);
 }

@@ -16,10 +16,10 @@
 namespace stillmap::test {
 namespace {
 
-constexpr double rad_per_deg = std::numbers::pi / 180.0;
+constexpr double rad_per_degree = std::numbers::pi / 180.0;
 constexpr double street_length_m = 130.0;
-constexpr double wall_height_m = 12.0;
-constexpr double lidar_height_m = 1.9;
+constexpr double front_height_m = 12.0;
+constexpr double height_in_street_m = 1.9;
 
 struct House {
   Eigen::Vector3d low, high;
@@ -32,8 +32,8 @@ class SmoothStreet {
   explicit SmoothStreet(bool is_bare) {
     add({-30.0, -30.0, -1.0}, {street_length_m + 30.0, 30.0, 0.0});
     if (is_bare) {
-      add({-30.0, -12.0, 0.0}, {street_length_m + 30.0, -11.0, wall_height_m});
-      add({-30.0, 13.0, 0.0}, {street_length_m + 30.0, 14.0, wall_height_m});
+      add({-30.0, -12.0, 0.0}, {street_length_m + 30.0, -11.0, front_height_m});
+      add({-30.0, 13.0, 0.0}, {street_length_m + 30.0, 14.0, front_height_m});
       return;
     }
     std::mt19937_64 random(5);
@@ -43,7 +43,7 @@ class SmoothStreet {
         const double width_m = 18.0 + 24.0 * share(random);
         const double face_m = side > 0.0 ? 13.0 : 11.0;
         add({x, std::min(side * face_m, side * (face_m + 9.0)), 0.0},
-            {x + width_m, std::max(side * face_m, side * (face_m + 9.0)), wall_height_m});
+            {x + width_m, std::max(side * face_m, side * (face_m + 9.0)), front_height_m});
         x += width_m + 3.0 * share(random);
       }
       for (double x = 15.0 * share(random); x < street_length_m; x += 16.0 + 14.0 * share(random))
@@ -58,9 +58,9 @@ class SmoothStreet {
     Scan scan;
     scan.stamp_ns = stamp_ns;
     for (int ring = 0; ring < 32; ++ring) {
-      const double elevation = (15.0 - ring) * rad_per_deg;
+      const double elevation = (15.0 - ring) * rad_per_degree;
       for (int k = 0; k < 900; ++k) {
-        const double azimuth = 0.4 * k * rad_per_deg;
+        const double azimuth = 0.4 * k * rad_per_degree;
         const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
                                   std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
         const double range_m = range(T_map_lidar.translation(), T_map_lidar.linear() * ray);
@@ -92,8 +92,8 @@ class SmoothStreet {
 };
 
 /// Off the axes, for rays that miss no plane.
-Eigen::Isometry3d pose(double x, double y, double heading_rad) {
-  return Eigen::Translation3d(x, y, lidar_height_m) *
+Eigen::Isometry3d pose_in_street(double x, double y, double heading_rad) {
+  return Eigen::Translation3d(x, y, height_in_street_m) *
          Eigen::AngleAxisd(heading_rad, Eigen::Vector3d::UnitZ()) *
          Eigen::AngleAxisd(0.003, Eigen::Vector3d::UnitX());
 }
@@ -105,7 +105,7 @@ std::shared_ptr<const PlaceIndex> index_of(const SmoothStreet& street) {
   SharedTrajectory path;
   for (int k = 0; k < 90; ++k) {
     LabelledScan scan;
-    const Eigen::Isometry3d T_map_lidar = pose(10.0 + 1.2 * k, 0.0, 0.002);
+    const Eigen::Isometry3d T_map_lidar = pose_in_street(10.0 + 1.2 * k, 0.0, 0.002);
     const std::int64_t stamp_ns = (k + 1) * 100'000'000LL;
     scan.scan = street.scan_at(T_map_lidar, stamp_ns);
     scan.motion.assign(scan.scan.size(), Motion::stationary);
@@ -121,7 +121,8 @@ TEST(SmoothStreetPlaces, AreFoundWhereTheyAreAndNotWhereTheMapsRingsLie) {
   const SmoothStreet street(false);
   const Localizer localizer(index_of(street));
   for (int k = 0; k < 8; ++k) {
-    const Eigen::Isometry3d T_map_lidar = pose(20.3 + 11.7 * k, 3.2, std::numbers::pi - 0.01);
+    const Eigen::Isometry3d T_map_lidar =
+        pose_in_street(20.3 + 11.7 * k, 3.2, std::numbers::pi - 0.01);
     const LocalizationQuery query(street.scan_at(T_map_lidar, 1000 + k), {},
                                   Eigen::Matrix3d::Identity());
     for (const double way_m : {-0.6, 0.6}) {
@@ -140,7 +141,7 @@ TEST(SmoothStreetPlaces, AreFoundWhereTheyAreAndNotWhereTheMapsRingsLie) {
 TEST(SmoothStreetPlaces, AreAmbiguousWhereNothingShowsTheWayAlong) {
   const SmoothStreet street(true);
   const Localizer localizer(index_of(street));
-  const Eigen::Isometry3d T_map_lidar = pose(62.4, 0.5, 0.01);
+  const Eigen::Isometry3d T_map_lidar = pose_in_street(62.4, 0.5, 0.01);
   const LocalizationQuery query(street.scan_at(T_map_lidar, 1000), {}, Eigen::Matrix3d::Identity());
   const LocalizationResult near =
       localizer.localize(query, SearchRegion{.centre_map = T_map_lidar.translation().head<2>(),
