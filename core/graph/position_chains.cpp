@@ -19,6 +19,9 @@ constexpr double max_sigmas = 3.0;
 constexpr std::size_t max_chains = 16;
 /// Heights are believed where so large a share of them agrees.
 constexpr double min_height_share = 0.5;
+/// Of a receiver whose height jumps more often than so, as a share of its positions, none is.
+constexpr double max_height_jumps_share = 0.1;
+constexpr std::size_t few_height_jumps = 2;
 /// Of a height that is not believed [m].
 constexpr double unknown_sigma_m = 1e4;
 
@@ -104,6 +107,7 @@ std::vector<bool> believed_heights(std::span<const PositionOnWay> positions) {
   const Eigen::Vector3d up_odom = up_by_heights(positions);
   // Numbers of positions, as PositionChains has them.
   std::vector<std::vector<std::size_t>> chains;
+  std::size_t jumps = 0;
   for (std::size_t i = 0; i < positions.size(); ++i) {
     const auto goes_on_from = [&](const std::vector<std::size_t>& chain) {
       const PositionOnWay& last = positions[chain.back()];
@@ -113,6 +117,7 @@ std::vector<bool> believed_heights(std::span<const PositionOnWay> positions) {
     };
     // The newest one is the last.
     const auto chain = std::ranges::find_if(chains.rbegin(), chains.rend(), goes_on_from);
+    if (chain != chains.rbegin()) ++jumps;
     if (chain == chains.rend()) {
       if (chains.size() >= max_chains)
         chains.erase(std::ranges::min_element(chains, {}, &std::vector<std::size_t>::size));
@@ -124,8 +129,11 @@ std::vector<bool> believed_heights(std::span<const PositionOnWay> positions) {
   }
   std::vector<bool> believed(positions.size(), false);
   const auto largest = std::ranges::max_element(chains, {}, &std::vector<std::size_t>::size);
-  if (largest == chains.end() || static_cast<double>(largest->size()) <
-                                     min_height_share * static_cast<double>(positions.size()))
+  const auto count = static_cast<double>(positions.size());
+  const bool jumps_often =
+      jumps > few_height_jumps && static_cast<double>(jumps) > max_height_jumps_share * count;
+  if (largest == chains.end() || jumps_often ||
+      static_cast<double>(largest->size()) < min_height_share * count)
     return believed;
   for (const std::size_t i : *largest) believed[i] = true;
   return believed;

@@ -25,7 +25,8 @@ struct PositionOnWay {
 
 /// Of which of these positions, in the order of their way, the heights follow each other as
 /// odometry has them, whichever way it has up: those of the largest such chain. None where that is
-/// less than half of them. A receiver's height may jump where its place does not.
+/// less than half of them, or where they jump again and again. A receiver's height may jump where
+/// its place does not.
 [[nodiscard]] std::vector<bool> believed_heights(std::span<const PositionOnWay> positions);
 
 /// Sorts measured positions by what they say of the way between them: those that follow each other
