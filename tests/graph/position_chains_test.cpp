@@ -109,6 +109,19 @@ TEST(PositionChains, HeightsThatJumpAllTheTimeAreNotBelieved) {
   EXPECT_EQ(heights(chains.believed()), 0U);
 }
 
+TEST(PositionChains, HeightsThatWanderByMetresAreNotBelieved) {
+  PositionChains chains(5.0, 10.0);
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> step_m(0.0, 0.4);
+  double height_m = 0.0;
+  for (int k = 0; k < 600; ++k) {
+    height_m = 0.99 * height_m + step_m(random);
+    chains.add(measured(k, place(k) + Eigen::Vector3d(0.0, 0.0, height_m), 0.02));
+  }
+  EXPECT_GE(chains.believed().size(), 100U);
+  EXPECT_EQ(heights(chains.believed()), 0U);
+}
+
 // Without an IMU a map is as level as its first scan's lidar was.
 TEST(PositionChains, OdometryMayBeTiltedAndATenthTooLong) {
   for (const double tilt_rad : {0.0, 0.5, 1.5}) {
