@@ -115,7 +115,12 @@ class Assembly {
       : writer_(writer), pieces_(std::move(pieces)), next_(pieces_.begin()), pause_(pause) {}
 
   [[nodiscard]] std::string whole() {
+    // At once: a string that grows is copied whole, without a pause.
+    constexpr std::size_t bytes_of_nodes_above = 20;
+    std::size_t bytes = 0;
+    for (const Piece& piece : pieces_) bytes += piece.bytes.size() + bytes_of_nodes_above;
     std::string out;
+    out.reserve(bytes);
     if (next_ != pieces_.end()) write(OctreePart(), out);
     return out;
   }
@@ -126,7 +131,7 @@ class Assembly {
       if (pause_) pause_();
       out += next_->bytes;
       // Of a large map, both would be in memory at once.
-      next_->bytes = {};
+      next_->bytes = std::string();
       return (next_++)->node;
     }
     const std::size_t begin = writer_.begin_inner(out);

@@ -69,7 +69,7 @@ class OccupancyThread {
   /// Drops and restores parts of the octree with the tiles that were evicted and reloaded.
   void follow(std::shared_ptr<const MapSnapshot> view);
 
-  /// Longest time for which an answer keeps the octree from being changed.
+  /// About the longest time for which an answer keeps the octree from being changed.
   static constexpr std::chrono::milliseconds reading_portion{1};
 
   /// Throws std::invalid_argument for a query that asks for too much, OctreeNotMade where
