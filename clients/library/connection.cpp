@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -140,11 +141,16 @@ void Client::Connection::require_one_server(const std::string& service) {
   constexpr std::chrono::milliseconds longest_answer(1000);
   GetStatus_Request question;
   question.format_version(dds::wire_format_version);
-  const std::vector<std::string> alive =
+  const std::optional<std::vector<std::string>> alive =
       client_of(dds::services::get_status)
           .who_answers(question, std::min(longest_answer, options.request_timeout));
+  if (!alive) {
+    throw ServiceError(service + " was not sent: several servers may be called '" +
+                       options.server_name +
+                       "', and another thread waits for the status of one; ask again");
+  }
   std::erase_if(servers, [&](const dds::RemoteParticipant& server) {
-    return std::ranges::find(alive, server.guid) == alive.end();
+    return std::ranges::find(*alive, server.guid) == alive->end();
   });
   if (servers.size() < 2) return;
   std::string text = service + " was not sent, since it would reach " +

@@ -110,12 +110,13 @@ class ServiceClient {
     return reply;
   }
 
-  /// As UntypedServiceClient::who_answers. Throws NotPermitted.
-  [[nodiscard]] std::vector<std::string> who_answers(const Request& request,
-                                                     std::chrono::milliseconds timeout) {
+  /// As UntypedServiceClient::who_answers; nothing where calls of other threads take all of the
+  /// time. Throws NotPermitted.
+  [[nodiscard]] std::optional<std::vector<std::string>> who_answers(
+      const Request& request, std::chrono::milliseconds timeout) {
     if (!refusal_.empty()) throw NotPermitted(refusal_);
     const Turn turn(*this, std::chrono::steady_clock::now() + timeout);
-    if (!turn.has_come()) return {};
+    if (!turn.has_come()) return std::nullopt;
     return client_->who_answers(&request, timeout);
   }
 

@@ -75,7 +75,7 @@ std::string DiscoveryDiagnostics::namesake_refusal() {
   }
   return text +
          ", so none carries it out: stop all but one, or give each its own topics.namespace or "
-         "domain";
+         "domain (one that was killed counts until its lease ends, some seconds)";
 }
 
 std::vector<dds::RemoteParticipant> DiscoveryDiagnostics::namesakes(

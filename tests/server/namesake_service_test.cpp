@@ -7,6 +7,7 @@
 #include <string>
 #include <thread>
 
+#include "idl/dds/service_client.hpp"
 #include "idl/dds/service_server.hpp"
 #include "idl/interface/services.hpp"
 #include "tests/server/server_process.hpp"
@@ -53,6 +54,18 @@ std::string refusal_of(Request request) {
   return {};
 }
 
+/// What a server says to a client that does not look for others, as those of ROS 2.
+template <typename Request, typename Reply>
+std::string refusal_by_server(const ServiceSetup& setup,
+                              const dds::ServiceSpec<Request, Reply>& service, Request request) {
+  request.format_version(dds::wire_format_version);
+  dds::Participant participant(setup.dds());
+  dds::ServiceClient<Request, Reply> client(participant, service.in("stillmap"));
+  if (!client.wait_for_server(patience)) return "no server";
+  const auto reply = client.call(request, patience);
+  return reply ? reply->status().reason() : "no answer";
+}
+
 TEST(Namesake, NoneChangesItsMapForARequestThatReachesBoth) {
   const ServiceSetup setup("every");
   const ServiceSetup another("every");
@@ -71,6 +84,11 @@ TEST(Namesake, NoneChangesItsMapForARequestThatReachesBoth) {
       EXPECT_THAT(why, AllOf(HasSubstr("2 servers called 'stillmap'"), HasSubstr("process "),
                              HasSubstr("topics.namespace")));
     }
+    EXPECT_THAT(refusal_by_server(setup, dds::services::reset, stillmap_msgs::srv::Reset_Request()),
+                HasSubstr("so none carries it out"));
+    EXPECT_THAT(
+        refusal_by_server(setup, dds::services::save_map, stillmap_msgs::srv::SaveMap_Request()),
+        HasSubstr("so none carries it out"));
     // It changes nothing, whichever looks.
     EXPECT_THAT(refusal_of([&] { static_cast<void>(client.localize({})); }),
                 Not(HasSubstr("2 servers")));
