@@ -61,6 +61,7 @@ class SharedMapper {
                                     const std::optional<Eigen::Isometry3d>& T_map_lidar_prior) {
     const py::gil_scoped_release released;
     const std::scoped_lock lock(mutex_);
+    trust_.forget_motion();
     const bool is_used = T_map_lidar_prior && is_believed(scan.stamp_ns, *T_map_lidar_prior);
     auto mapped = mapper_->process(scan, is_used ? T_map_lidar_prior : std::nullopt);
     if (mapped) learn(*mapped);
@@ -83,7 +84,6 @@ class SharedMapper {
 
  private:
   [[nodiscard]] bool is_believed(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map_lidar) {
-    trust_.forget_motion();
     return !last_ || (trust_.is_possible(last_->T_map_lidar.inverse() * T_map_lidar,
                                          1e-9 * static_cast<double>(stamp_ns - last_->stamp_ns)) &&
                       trust_.is_believed());
@@ -216,9 +216,10 @@ void bind_mapper(py::module_& module) {
            "lidar leans. Raises ConfigError, ValueError.")
       .def(
           "process", &process, py::arg("scan"), py::arg("T_map_lidar_prior") = py::none(),
-          "Maps a Scan. T_map_lidar_prior: (4, 4), where another odometry has the lidar, replaces "
-          "the constant-velocity prediction as long as such poses foretell what is registered, and "
-          "are no jumps; any does at the start, and after a scan that was lost. "
+          "Maps a Scan. T_map_lidar_prior: (4, 4), the last pose times what another odometry has "
+          "moved since, replaces the constant-velocity prediction as long as such motions foretell "
+          "what is registered, and are no jumps; any does at the start, and after a scan that was "
+          "lost. "
           "None for a scan that cannot be mapped; last_rejection says why.")
       .def_property_readonly("last_rejection",
                              [](SharedMapper& shared) {
