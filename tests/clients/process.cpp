@@ -58,6 +58,12 @@ BackgroundProcess::~BackgroundProcess() {
 
 void BackgroundProcess::send(int signal) const { kill(pid_, signal); }
 
+bool BackgroundProcess::has_ended() const {
+  siginfo_t ended{};
+  return waitid(P_PID, static_cast<id_t>(pid_), &ended, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+         ended.si_pid == pid_;
+}
+
 int BackgroundProcess::stop() {
   send(SIGTERM);
   return wait();

@@ -28,6 +28,8 @@ class BackgroundProcess {
   BackgroundProcess& operator=(const BackgroundProcess&) = delete;
 
   void send(int signal) const;
+  /// It is wait()'s to tell how.
+  [[nodiscard]] bool has_ended() const;
   /// Waits for its end; returns its exit code, -1 when a signal ended it.
   int wait();
   /// SIGTERM, and wait().
