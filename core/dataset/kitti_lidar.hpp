@@ -39,8 +39,10 @@ struct AzimuthSteps {
 
 /// Recognises KITTI's lidar by the unevenness of its beams, which no other one shares, from scans
 /// taken all over a recording. Nothing for any other lidar, real or simulated.
-/// `period_s` is the time between scans.
+/// `period_s` is the time between scans. Where `may_be_corrected`, as of all files but KITTI's own,
+/// nothing for scans whose points have been turned up before, as those of a replay.
 [[nodiscard]] std::optional<KittiLidar> recognise_kitti_lidar(std::span<const Scan> scans,
-                                                              double period_s);
+                                                              double period_s,
+                                                              bool may_be_corrected);
 
 }  // namespace stillmap

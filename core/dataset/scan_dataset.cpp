@@ -298,7 +298,8 @@ std::optional<KittiLidar> ScanDataset::find_kitti_lidar() const {
       continue;
     }
   }
-  return recognise_kitti_lidar(scans, period_s());
+  const bool is_kittis_own = ending_of(files_.front()) == ".bin";
+  return recognise_kitti_lidar(scans, period_s(), !is_kittis_own);
 }
 
 double ScanDataset::period_s() const {
@@ -348,7 +349,8 @@ std::vector<std::string> ScanDataset::remarks() const {
   if (is_too_large_)
     remarks.push_back(
         "half of the points lie more than 150 m away: coordinates are taken for "
-        "metres, and these may be centimetres or millimetres");
+        "metres in the lidar's frame, and these may be centimetres or millimetres, or in "
+        "the frame of a map");
   return remarks;
 }
 

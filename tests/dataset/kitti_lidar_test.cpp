@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "core/lidar/prepare.hpp"
 #include "tests/dataset/kitti_lidar_scan.hpp"
 
 namespace stillmap {
@@ -17,7 +18,7 @@ using test::per_degree;
 
 std::optional<KittiLidar> recognised(const Drawing& drawing) {
   const Scan scan = draw(drawing);
-  return recognise_kitti_lidar(std::span(&scan, 1), 0.1);
+  return recognise_kitti_lidar(std::span(&scan, 1), 0.1, false);
 }
 
 TEST(KittiLidar, IsRecognisedRollingAsInKittiRaw) {
@@ -38,13 +39,24 @@ TEST(KittiLidar, IsNotSeenInOtherLidars) {
   EXPECT_FALSE(recognised({.is_uneven = false}));
   // Its beams, but turned by a simulator.
   EXPECT_FALSE(recognised({.azimuth_noise_deg = 0.0}));
-  EXPECT_FALSE(recognise_kitti_lidar({}, 0.1));
+  EXPECT_FALSE(recognise_kitti_lidar({}, 0.1, false));
   const Scan empty;
-  EXPECT_FALSE(recognise_kitti_lidar(std::span(&empty, 1), 0.1));
+  EXPECT_FALSE(recognise_kitti_lidar(std::span(&empty, 1), 0.1, false));
   Scan shuffled = draw({});
   std::mt19937 random(3);
   std::ranges::shuffle(shuffled.points_lidar, random);
-  EXPECT_FALSE(recognise_kitti_lidar(std::span(&shuffled, 1), 0.1));
+  EXPECT_FALSE(recognise_kitti_lidar(std::span(&shuffled, 1), 0.1, false));
+}
+
+/// As a replay of KITTI odometry is recorded: without times and rings.
+TEST(KittiLidar, IsNotCorrectedTwice) {
+  Scan scan = draw({.way_m = 0.5});
+  // Its lower beams look down by 15.92 degrees in the mean.
+  turn_up(scan, 0.66 * per_degree);
+  const auto lidar = recognise_kitti_lidar(std::span(&scan, 1), 0.1, true);
+  ASSERT_TRUE(lidar);
+  lidar->correct(scan);
+  EXPECT_FALSE(recognise_kitti_lidar(std::span(&scan, 1), 0.1, true));
 }
 
 TEST(AzimuthSteps, TellTheWayThatWasCompensatedFor) {
