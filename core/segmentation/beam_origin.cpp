@@ -10,15 +10,17 @@
 namespace stillmap {
 namespace {
 
-/// Ground near the origin's height: cells of a metre around it in which nothing else is seen.
+/// Ground at the origin's height: cells of a metre around it in which nothing else is seen, and
+/// that lie at 0 in the median, not as far below as a lidar near the floor has them.
 bool lies_on_ground(std::span<const Eigen::Vector3f> points) {
-  constexpr float reach_m = 20.0F, ground_m = 0.2F, below_m = -0.3F;
+  constexpr float reach_m = 20.0F, ground_m = 0.2F, max_median_m = 0.1F, below_m = -0.3F;
   constexpr int cells_across = 40, min_points = 3;
   constexpr std::size_t min_bare_cells = 100;
   constexpr double min_bare_share = 0.15, max_share_below = 0.1;
   struct Cell {
     int points = 0;
     bool is_bare = true;
+    float sum_z_m = 0.0F;
   };
   std::vector<Cell> cells(cells_across * cells_across);
   std::size_t near = 0, below = 0;
@@ -28,15 +30,24 @@ bool lies_on_ground(std::span<const Eigen::Vector3f> points) {
     if (at.minCoeff() < 0 || at.maxCoeff() >= cells_across) continue;
     Cell& cell = cells[static_cast<std::size_t>(at.y() * cells_across + at.x())];
     ++cell.points;
+    cell.sum_z_m += p.z();
     cell.is_bare = cell.is_bare && std::abs(p.z()) < ground_m;
     ++near;
     below += p.z() < below_m ? 1 : 0;
   }
   std::erase_if(cells, [](const Cell& cell) { return cell.points < min_points; });
-  const auto bare = static_cast<std::size_t>(std::ranges::count_if(cells, &Cell::is_bare));
-  return bare >= min_bare_cells &&
-         static_cast<double>(bare) >= min_bare_share * static_cast<double>(cells.size()) &&
-         static_cast<double>(below) <= max_share_below * static_cast<double>(near);
+  const double seen_cells = static_cast<double>(cells.size());
+  std::erase_if(cells, [](const Cell& cell) { return !cell.is_bare; });
+  if (cells.size() < min_bare_cells ||
+      static_cast<double>(cells.size()) < min_bare_share * seen_cells ||
+      static_cast<double>(below) > max_share_below * static_cast<double>(near))
+    return false;
+  const auto height_of = [](const Cell& cell) {
+    return cell.sum_z_m / static_cast<float>(cell.points);
+  };
+  const auto middle = cells.begin() + static_cast<std::ptrdiff_t>(cells.size() / 2);
+  std::ranges::nth_element(cells, middle, {}, height_of);
+  return std::abs(height_of(*middle)) < max_median_m;
 }
 
 /// Where a point that stands up lies: away from the z axis, and above the origin [m].
@@ -87,6 +98,9 @@ std::optional<double> lidar_height_over_origin(std::span<const Eigen::Vector3f> 
   constexpr std::size_t min_points = 500;
   // Compensated scans of KITTI, whose beams start 20 cm apart, have 0.07 to 0.4, others 1 and more.
   constexpr double min_depth = 0.05;
+  // Half way there it is nearly as deep: what is broad is the shape of the place, not beams.
+  constexpr std::size_t half_way = reach / 2;
+  constexpr double min_steepness = 0.6;
   if (!lies_on_ground(points)) return std::nullopt;
   const std::vector<Upright> upright = upright_points(points);
   if (upright.size() < min_points) return usual_height_m;
@@ -100,6 +114,8 @@ std::optional<double> lidar_height_over_origin(std::span<const Eigen::Vector3f> 
   for (std::size_t k = reach; k < heights + reach; ++k) {
     const double depth = std::min(entropy[k - reach], entropy[k + reach]) - entropy[k];
     if (depth <= deepest) continue;
+    const double near_depth = std::min(entropy[k - half_way], entropy[k + half_way]) - entropy[k];
+    if (near_depth < min_steepness * depth) continue;
     deepest = depth;
     height_m = step_m * static_cast<double>(k - reach);
   }

@@ -223,8 +223,10 @@ NetworkSegmenter::View NetworkSegmenter::view_of(const Scan& scan, const Mount& 
   if (!model_.follow_sensor || !model_.lidar_height_m || mount.height_m) return view;
   const auto height_m = lidar_height_over_origin(scan.points_lidar, *model_.lidar_height_m);
   if (!height_m) return view;
-  for (const Eigen::Vector3f& p : scan.points_lidar)
-    view.moved_points.emplace_back(p.x(), p.y(), p.z() - static_cast<float>(*height_m));
+  view.moved_points = scan.points_lidar;
+  for (Eigen::Vector3f& p : view.moved_points) {
+    if (is_measured(p)) p.z() -= static_cast<float>(*height_m);
+  }
   if (const auto field = field_of_view(view.moved_points)) {
     view.projection.fov_down = field->first;
     view.projection.fov_up = field->second;
