@@ -170,6 +170,19 @@ std::filesystem::path written_first(const std::filesystem::path& real) {
   return real.string() + ".unfinished";
 }
 
+/// Into a file whose place is somebody else's, as one that a container has mounted, its content is
+/// copied.
+void put_in_place(const std::filesystem::path& unfinished, const std::filesystem::path& real,
+                  std::error_code& fault) {
+  std::filesystem::rename(unfinished, real, fault);
+  if (!fault || !std::filesystem::exists(real)) return;
+  fault.clear();
+  std::filesystem::copy_file(unfinished, real, std::filesystem::copy_options::overwrite_existing,
+                             fault);
+  std::error_code ignored;
+  std::filesystem::remove(unfinished, ignored);
+}
+
 template <std::size_t point_bytes, class Pack>
 void write_cloud(const std::filesystem::path& file, const std::string& header,
                  std::span<const ColouredPoint> points, Pack pack) {
@@ -177,8 +190,13 @@ void write_cloud(const std::filesystem::path& file, const std::string& header,
   // A link stays, and what it leads to is replaced.
   const std::filesystem::path resolved = std::filesystem::weakly_canonical(file, fault);
   const std::filesystem::path real = fault ? file : resolved;
-  const std::filesystem::path unfinished = written_first(real);
+  std::filesystem::path unfinished = written_first(real);
   std::ofstream out(unfinished, std::ios::binary | std::ios::trunc);
+  if (!out && unfinished != real && std::filesystem::exists(real, fault)) {
+    // A file in a folder that takes no other one.
+    unfinished = real;
+    out.open(real, std::ios::binary | std::ios::trunc);
+  }
   out << header;
   std::array<char, point_bytes> bytes{};
   for (const ColouredPoint& point : points) {
@@ -187,7 +205,7 @@ void write_cloud(const std::filesystem::path& file, const std::string& header,
   }
   out.close();
   fault.clear();
-  if (out && unfinished != real) std::filesystem::rename(unfinished, real, fault);
+  if (out && unfinished != real) put_in_place(unfinished, real, fault);
   if (out && !fault) return;
   if (unfinished != real) std::filesystem::remove(unfinished, fault);
   throw DatasetWriteError(file, "cannot be written; check the folder and the space left");
