@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <span>
 #include <utility>
@@ -202,13 +203,15 @@ std::vector<std::uint16_t> rings_from_elevation(const Scan& scan, const SensorMo
 
 std::vector<std::uint16_t> rings_from_order(const Scan& scan, const SensorModel& sensor) {
   const std::vector<float> slopes = of_each_point<float>(scan, slope);
+  std::vector<float> measured_slopes;
+  measured_slopes.reserve(slopes.size());
+  std::ranges::copy_if(slopes, std::back_inserter(measured_slopes),
+                       [](float s) { return !std::isnan(s); });
   const auto steps = [&](std::span<const std::uint16_t> rings) {
-    std::vector<float> measured_slopes;
     std::vector<std::uint16_t> measured_rings;
+    measured_rings.reserve(measured_slopes.size());
     for (std::size_t i = 0; i < slopes.size(); ++i) {
-      if (std::isnan(slopes[i])) continue;
-      measured_slopes.push_back(slopes[i]);
-      measured_rings.push_back(rings[i]);
+      if (!std::isnan(slopes[i])) measured_rings.push_back(rings[i]);
     }
     return steps_at_cuts(measured_slopes, measured_rings, sensor);
   };

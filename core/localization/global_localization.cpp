@@ -120,7 +120,8 @@ GlobalLocalization::Outcome GlobalLocalization::look_for(const Localizer& locali
   const std::vector<PlaceHypothesis> places = mean_places();
   const bool is_of_several = window_.size() > 1;
   const LocalizationStatus status =
-      is_of_several ? judge_places(places, localizer.config()) : result.status;
+      is_of_several ? judge_places(places, localizer.config(), regions.searched.has_value())
+                    : result.status;
   if (is_of_several && status == LocalizationStatus::found)
     return take_found(places.front().T_map_lidar);
   return status == LocalizationStatus::ambiguous ? Outcome::ambiguous : Outcome::not_found;
