@@ -132,6 +132,7 @@ void Odometry::use_sensor(const SensorModel& sensor) {
 void Odometry::set_clock(std::int64_t shift_ns) {
   state_->intervals.set_clock(shift_ns);
   if (state_->stretch) state_->stretch->set_clock(shift_ns);
+  if (state_->led) state_->led->intervals.set_clock(shift_ns);
 }
 
 void Odometry::reset() { *state_ = State(state_->first_config, state_->sensor); }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/odometry/expected_poses.hpp"
 #include "core/odometry/object_clusters.hpp"
 #include "core/odometry/relocalization.hpp"
 #include "core/odometry/ring_tangents.hpp"
@@ -14,8 +15,7 @@
 namespace stillmap {
 namespace {
 
-/// A lost scan is looked for up to so far away, and farther by what was driven since [m].
-constexpr double relocalization_reach_m = 24.0;
+/// No lost scan is looked for farther away than this [m].
 constexpr double max_relocalization_reach_m = 60.0;
 /// Motion is classified again where the pose is farther than this from the predicted one [m, rad].
 constexpr double reclassify_distance_m = 0.2;
@@ -61,12 +61,16 @@ PosePrediction Odometry::State::predict(std::int64_t time_ns,
                                         bool is_prior,
                                         const std::optional<InertialMotion>& inertial) const {
   const double interval_s = intervals.since_last_s(time_ns);
-  return {.T_map_lidar = T_map_lidar_known
-                             ? *T_map_lidar_known
-                             : last.T_map_lidar * motion_to_middle(interval_s, inertial),
+  // A lidar that stays lost does not go back to where it was before.
+  const double moved_s = lost_scans > 0 ? std::min(interval_s, max_prediction_s) : interval_s;
+  return {.T_map_lidar = T_map_lidar_known ? *T_map_lidar_known
+                         : led             ? led->T_map_lidar_at(time_ns)
+                                           : last.T_map_lidar * motion_to_middle(moved_s, inertial),
           .interval_s = interval_s,
+          .driven_m = led ? led->driven_m(time_ns) : last.speed_m_s() * interval_s,
           .is_known = is_prior || has_velocity(time_ns),
           .is_prior = is_prior,
+          .is_led = led && !is_prior,
           .lost_scans = lost_scans,
           .is_searched_widely = is_searched_widely()};
 }
@@ -99,10 +103,9 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
     return found;
   }
   if (lost_scans > 0 && is_searched_widely()) {
-    const double driven_m = last.speed_m_s() * prediction.interval_s;
-    const OdometryResult again =
-        relocalize(features, points_of(map), map, prediction.T_map_lidar, method(),
-                   std::min(relocalization_reach_m + driven_m, max_relocalization_reach_m));
+    const OdometryResult again = relocalize(
+        features, points_of(map), map, prediction.T_map_lidar, method(),
+        std::min(relocalization_reach_m + prediction.driven_m, max_relocalization_reach_m));
     if (fits.believes_relocalized(again)) return again;
   }
   return lost_at(prediction.T_map_lidar);
@@ -177,6 +180,7 @@ void Odometry::State::update_state(std::int64_t stamp_ns, std::optional<RangeIma
   }
   started = true;
   prior_map = {};
+  led.reset();
   last.T_map_lidar = T_map_lidar_now;
   if (!view) return;
   view->move_to(T_map_lidar_now);
@@ -208,7 +212,12 @@ void Odometry::State::confirm_place(const FeatureSets& features, const PosePredi
   if (config.paper_exact || !fits.are_known()) return;
   if (result.health == OdometryHealth::lost) {
     // What the stretch has brought did not help: it is looked for in what was known before.
-    if (stretch && lost_scans > 0) forget_stretch();
+    // Not where that is out of reach by now, and only what lies there looks alike.
+    if (stretch && lost_scans > 0 &&
+        stretch->is_in_reach(result.T_map_lidar, prediction.driven_m)) {
+      result.T_map_lidar = stretch->where_motion_led(result.T_map_lidar);
+      forget_stretch();
+    }
     if (stretch && !stretch->has_jumped()) result.map_entry = MapEntry::stays_out;
     return;
   }
@@ -218,8 +227,9 @@ void Odometry::State::confirm_place(const FeatureSets& features, const PosePredi
   if (!stretch && !is_doubtful) return;
   if (!stretch) stretch.emplace(UnconfirmedStretch::Trusted{map, last, intervals, fits});
   if (is_jump) {
-    const double distance_m = distance_from_expected(result.T_map_lidar, last, prediction);
-    if (!is_followed(distance_m, prediction)) stretch->jump(distance_m);
+    const Eigen::Isometry3d T_expected = nearest_expected(result.T_map_lidar, last, prediction);
+    if (!is_followed(result.T_map_lidar, T_expected, prediction))
+      stretch->jump(T_expected, result.T_map_lidar);
   }
   using enum UnconfirmedStretch::Decision;
   const auto decision = stretch->evaluate(features, config, result);
@@ -231,8 +241,8 @@ void Odometry::State::confirm_place(const FeatureSets& features, const PosePredi
   if (decision == confirmed || decision == settled) return stretch.reset();
   result.health = OdometryHealth::degenerate;
   if (decision == open) return;
+  result = lost_at(stretch->where_motion_led(result.T_map_lidar));
   forget_stretch();
-  result = lost_at(last.T_map_lidar);
 }
 
 void Odometry::State::begin_anew(const FeatureSets& features, OdometryResult& result) {
@@ -252,6 +262,10 @@ void Odometry::State::begin_anew(const FeatureSets& features, OdometryResult& re
 }
 
 void Odometry::State::forget_stretch() {
+  led = LedSince{.T_map_lidar = stretch->where_motion_led(last.T_map_lidar),
+                 .motion = has_jumped ? Eigen::Isometry3d::Identity() : last.motion,
+                 .interval_s = last.interval_s,
+                 .intervals = intervals};
   UnconfirmedStretch::Trusted trusted = stretch->take_trusted();
   map = std::move(trusted.map);
   fits = trusted.fits;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -14,9 +15,32 @@
 #include "core/odometry/ring_start.hpp"
 #include "core/odometry/scan_features.hpp"
 #include "core/odometry/scan_intervals.hpp"
+#include "core/odometry/se3.hpp"
 #include "core/odometry/unconfirmed_stretch.hpp"
 
 namespace stillmap {
+
+/// Where motion led along a stretch that was forgotten, until a scan is found again: the robot has
+/// moved since its place was known for sure.
+struct LedSince {
+  Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
+  /// The last motion along the stretch, the time it took [s], and the times of its scans.
+  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+  double interval_s = 0.0;
+  ScanIntervals intervals;
+
+  /// By the last motion, for as long as that tells anything.
+  [[nodiscard]] Eigen::Isometry3d T_map_lidar_at(std::int64_t time_ns) const {
+    if (interval_s <= 0.0) return T_map_lidar;
+    const double since_s = std::min(intervals.since_last_s(time_ns), max_prediction_s);
+    return T_map_lidar * scaled_motion(motion, since_s / interval_s);
+  }
+  /// What may have been driven since, at the speed of then [m].
+  [[nodiscard]] double driven_m(std::int64_t time_ns) const {
+    if (interval_s <= 0.0) return 0.0;
+    return motion.translation().norm() / interval_s * intervals.since_last_s(time_ns);
+  }
+};
 
 /// What Odometry keeps from scan to scan, and the steps of registering one.
 struct Odometry::State {
@@ -105,7 +129,7 @@ struct Odometry::State {
                      OdometryResult& result);
   /// Takes this scan for the first one where no other could be registered to that.
   void begin_anew(const FeatureSets& features, OdometryResult& result);
-  /// Local map and velocity as they were before the stretch.
+  /// Local map and velocity as they were before the stretch; where its motion led stays known.
   void forget_stretch();
   /// To the covariance of a pose that is not confirmed.
   void add_drift(std::int64_t time_ns, const PosePrediction& prediction, OdometryResult& result);
@@ -138,6 +162,8 @@ struct Odometry::State {
   RangeImageHistory history;
   /// Since the place is in doubt.
   std::optional<UnconfirmedStretch> stretch;
+  /// While lost after one.
+  std::optional<LedSince> led;
   bool started = false;
   bool has_prior_map = false;
   /// The lidar moves as it did in the map before this one.

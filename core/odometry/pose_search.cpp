@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <vector>
 
+#include "core/odometry/expected_poses.hpp"
 #include "core/odometry/point_alignment.hpp"
 #include "core/odometry/relocalization.hpp"
 #include "core/odometry/scan_features.hpp"
@@ -38,17 +38,6 @@ constexpr double min_way_m = 0.02;
 /// A pose that traffic pulls by more than this is not called good [m, rad].
 constexpr double max_pull_m = 0.1;
 constexpr double max_pull_rad = 0.01;
-/// Gaps longer than this are looked across from where the lidar was last, too [s].
-constexpr double short_gap_s = 1.0;
-/// After a gap of up to this the lidar may have gone straight on [s].
-constexpr double max_gap_s = 10.0;
-/// How far off its way a lidar may be after a gap of one second [m/s^2], at least and at most [m].
-constexpr double gap_acceleration_m_s2 = 1.5;
-constexpr double min_gap_reach_m = 3.0;
-constexpr double max_gap_reach_m = 15.0;
-/// After so few lost scans, so near to where its motion led [m], it was followed.
-constexpr int max_missed_scans = 2;
-constexpr double missed_distance_m = 0.5;
 /// Registration and motion agree on a pose [m, rad].
 constexpr double foretold_distance_m = 0.1;
 constexpr double foretold_angle_rad = 0.01;
@@ -252,19 +241,6 @@ struct SecondOpinion {
   PoseTangent off;
 };
 
-/// Where the lidar may be after the prediction has failed.
-std::vector<Eigen::Isometry3d> starts_without_prediction(const RegisteredScan& last,
-                                                         const PosePrediction& prediction) {
-  std::vector<Eigen::Isometry3d> starts{prediction.T_map_lidar};
-  if (prediction.lost_scans == 0 && prediction.interval_s <= short_gap_s) return starts;
-  starts.push_back(last.T_map_lidar);
-  // Straight on during a gap.
-  if (last.interval_s > 0.0 && prediction.interval_s > 0.0 && prediction.interval_s < max_gap_s)
-    starts.push_back(last.T_map_lidar *
-                     scaled_motion(last.motion, prediction.interval_s / last.interval_s));
-  return starts;
-}
-
 bool want_the_same(const Eigen::Vector2d& way_m, const Eigen::Vector2d& other_way_m) {
   const double along_m2 = way_m.dot(other_way_m);
   const double longer_m2 = std::max(way_m.squaredNorm(), other_way_m.squaredNorm());
@@ -401,21 +377,6 @@ OdometryResult doubted_where_pulled(OdometryResult found, const FeatureSets& fea
                      pull.tail<3>().norm() < max_pull_rad;
   if (!stays) found.health = OdometryHealth::degenerate;
   return found;
-}
-
-double distance_from_expected(const Eigen::Isometry3d& T_map_lidar, const RegisteredScan& last,
-                              const PosePrediction& prediction) {
-  double nearest_m = std::numeric_limits<double>::infinity();
-  for (const Eigen::Isometry3d& T : starts_without_prediction(last, prediction))
-    nearest_m = std::min(nearest_m, (T_map_lidar.translation() - T.translation()).norm());
-  return nearest_m;
-}
-
-bool is_followed(double distance_m, const PosePrediction& prediction) {
-  if (prediction.lost_scans > 0)
-    return prediction.lost_scans <= max_missed_scans && distance_m < missed_distance_m;
-  const double reach_m = gap_acceleration_m_s2 * std::pow(prediction.interval_s, 2);
-  return distance_m < std::clamp(reach_m, min_gap_reach_m, max_gap_reach_m);
 }
 
 bool is_unvouched(const OdometryResult& found, const PosePrediction& prediction,

@@ -33,10 +33,14 @@ struct PosePrediction {
   Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
   /// Time since the last registered scan [s].
   double interval_s = 0.0;
+  /// What may have been driven since the lidar was last followed, at its speed of then [m].
+  double driven_m = 0.0;
   /// A velocity or a prior tells it.
   bool is_known = false;
   /// A prior tells it, of what the scan itself does not show, too.
   bool is_prior = false;
+  /// The motion along a stretch that was forgotten leads there: not the last registered scan's.
+  bool is_led = false;
   /// Scans in a row before this one that could not be registered.
   int lost_scans = 0;
   /// Starts farther off are tried, too: not for every one of many lost scans.
@@ -72,17 +76,6 @@ struct PosePrediction {
 [[nodiscard]] OdometryResult doubted_where_pulled(OdometryResult found, const FeatureSets& features,
                                                   const LocalMap& map,
                                                   const OdometryConfig& config);
-
-/// How far a pose is from the nearest one that motion before a gap leads to [m]: the prediction,
-/// the last pose, or straight on from it.
-[[nodiscard]] double distance_from_expected(const Eigen::Isometry3d& T_map_lidar,
-                                            const RegisteredScan& last,
-                                            const PosePrediction& prediction);
-
-/// Whether a pose so far from where motion led (see distance_from_expected) belongs to the same
-/// drive: across a gap the lidar may have braked, sped up or turned; once lost it may be anywhere,
-/// unless traffic hid what it knew for a moment.
-[[nodiscard]] bool is_followed(double distance_m, const PosePrediction& prediction);
 
 /// Whether a pose fits so much worse than poses have lately that motion alone could vouch for it,
 /// and motion led elsewhere: for the length of a scan, streets of two cities may look alike.

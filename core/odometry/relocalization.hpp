@@ -6,6 +6,9 @@
 
 namespace stillmap {
 
+/// A lost scan is looked for up to so far away, and farther by what was driven since [m].
+constexpr double relocalization_reach_m = 24.0;
+
 /// All points of the map.
 [[nodiscard]] std::vector<LabelledPoint> points_of(const LocalMap& map);
 

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "core/odometry/prior_map.hpp"
+#include "core/odometry/relocalization.hpp"
 
 namespace stillmap {
 namespace {
@@ -69,9 +70,12 @@ Eigen::Matrix<double, 6, 6> unknown_pose_covariance() {
   return sigma.cwiseAbs2().asDiagonal();
 }
 
-void UnconfirmedStretch::jump(double distance_m) {
+void UnconfirmedStretch::jump(const Eigen::Isometry3d& T_map_lidar_expected,
+                              const Eigen::Isometry3d& T_map_lidar_found) {
   has_jumped_ = true;
-  has_jumped_far_ |= distance_m > near_jump_m;
+  has_jumped_far_ |=
+      (T_map_lidar_found.translation() - T_map_lidar_expected.translation()).norm() > near_jump_m;
+  T_led_found_ = T_led_found_ * T_map_lidar_expected * T_map_lidar_found.inverse();
   scans_since_jump_ = 0;
   has_agreed_ = false;
 }
@@ -96,7 +100,7 @@ UnconfirmedStretch::Decision UnconfirmedStretch::evaluate(const FeatureSets& fea
     count_agreeing(false, found.T_map_lidar.translation());
     count_contradicting(false);
     found.map_entry = entry_of_open();
-    return is_overdue() ? Decision::contradicted : Decision::open;
+    return is_overdue(found.T_map_lidar) ? Decision::contradicted : Decision::open;
   }
   OdometryResult in_trusted_map =
       register_features(features, trusted_.map, found.T_map_lidar, config, found.sweep_correction);
@@ -119,8 +123,20 @@ MapEntry UnconfirmedStretch::entry_of_open() const {
   return has_jumped_ ? MapEntry::stays_out_with_waiting : MapEntry::waits;
 }
 
-bool UnconfirmedStretch::is_overdue() const {
-  return has_jumped_ && !has_agreed_ && scans_since_jump_ >= scans_to_agree_in;
+double UnconfirmedStretch::distance_from_trusted_m(const Eigen::Isometry3d& T_map_lidar) const {
+  return (where_motion_led(T_map_lidar).translation() - trusted_.last.T_map_lidar.translation())
+      .norm();
+}
+
+bool UnconfirmedStretch::is_in_reach(const Eigen::Isometry3d& T_map_lidar, double driven_m) const {
+  return distance_from_trusted_m(T_map_lidar) <= relocalization_reach_m + driven_m;
+}
+
+bool UnconfirmedStretch::is_overdue(const Eigen::Isometry3d& T_map_lidar) const {
+  if (!has_jumped_ || has_agreed_ || scans_since_jump_ < scans_to_agree_in) return false;
+  // From what is out of sight, or of reach of one that is near its place, nothing can agree.
+  return has_jumped_far_ ? distance_from_trusted_m(T_map_lidar) <= settling_path_m
+                         : is_in_reach(T_map_lidar, 0.0);
 }
 
 bool UnconfirmedStretch::stands_on_trusted_map(const OdometryResult& in_trusted_map) const {
@@ -164,7 +180,8 @@ UnconfirmedStretch::Decision UnconfirmedStretch::decide(const OdometryResult& in
                                             trusted_.fits.believes_relocalized(found));
   count_contradicting(!stays && in_trusted_map.overlap >= min_contradicting_overlap &&
                       is_elsewhere);
-  if (is_overdue() || contradicting_scans_ >= contradicting_scans) return Decision::contradicted;
+  if (is_overdue(found.T_map_lidar) || contradicting_scans_ >= contradicting_scans)
+    return Decision::contradicted;
   return !has_jumped_ && good_path_m_ >= settling_path_m ? Decision::settled : Decision::open;
 }
 

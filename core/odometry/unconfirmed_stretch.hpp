@@ -44,9 +44,10 @@ class UnconfirmedStretch {
 
   explicit UnconfirmedStretch(Trusted trusted) : trusted_(std::move(trusted)) {}
 
-  /// No motion has told where the next scan is: it was looked for, and found so far from where it
-  /// may be expected [m]. Places look alike.
-  void jump(double distance_m);
+  /// No motion has told where the next scan is: it was looked for, and found elsewhere than it may
+  /// be expected. Places look alike.
+  void jump(const Eigen::Isometry3d& T_map_lidar_expected,
+            const Eigen::Isometry3d& T_map_lidar_found);
 
   /// Judges the stretch by a scan that was registered at `found`; one that is degenerate itself
   /// tells nothing. Where it is confirmed, `found` becomes the pose in the trusted map. Says what
@@ -60,13 +61,22 @@ class UnconfirmedStretch {
   void set_clock(std::int64_t shift_ns) { trusted_.intervals.set_clock(shift_ns); }
   [[nodiscard]] const Trusted& trusted() const { return trusted_; }
   [[nodiscard]] bool has_jumped() const { return has_jumped_; }
+  /// A pose of the stretch as it would be had it not jumped: where motion alone led to.
+  [[nodiscard]] Eigen::Isometry3d where_motion_led(const Eigen::Isometry3d& T_map_lidar) const {
+    return T_led_found_ * T_map_lidar;
+  }
+  /// Whether a search from where motion led to, up to there and then for so far on [m], may come to
+  /// the last pose before the stretch.
+  [[nodiscard]] bool is_in_reach(const Eigen::Isometry3d& T_map_lidar, double driven_m) const;
   /// Ends the stretch.
   [[nodiscard]] Trusted take_trusted() { return std::move(trusted_); }
 
  private:
   [[nodiscard]] bool stands_on_trusted_map(const OdometryResult& in_trusted_map) const;
   [[nodiscard]] Decision decide(const OdometryResult& in_trusted_map, const OdometryResult& found);
-  [[nodiscard]] bool is_overdue() const;
+  [[nodiscard]] double distance_from_trusted_m(const Eigen::Isometry3d& T_map_lidar) const;
+  /// Whether a stretch that has jumped is to be given up at this pose, since nothing agrees.
+  [[nodiscard]] bool is_overdue(const Eigen::Isometry3d& T_map_lidar) const;
   [[nodiscard]] MapEntry entry_of_open() const;
 
   /// Counts the way on which scans showed all of their motion.
@@ -80,6 +90,8 @@ class UnconfirmedStretch {
   bool has_jumped_ = false;
   /// So far that a place that looks alike may have been taken for the right one.
   bool has_jumped_far_ = false;
+  /// Takes poses of the stretch to where motion alone led.
+  Eigen::Isometry3d T_led_found_ = Eigen::Isometry3d::Identity();
   /// Scans since the jump, and those in a row that come to the same place in the trusted map, or
   /// that it contradicts.
   int scans_since_jump_ = 0;

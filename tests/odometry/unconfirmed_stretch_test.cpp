@@ -45,6 +45,11 @@ UnconfirmedStretch stretch_of_here() {
   return UnconfirmedStretch(std::move(trusted));
 }
 
+/// One that was looked for, and found so far ahead of where it was expected [m].
+void jump(UnconfirmedStretch& stretch, double distance_m) {
+  stretch.jump(Eigen::Isometry3d::Identity(), level_pose(distance_m, 0.0, 0.0));
+}
+
 /// What the stretch says of scans of a world that were registered with this error, which drive on
 /// by so much each [m].
 std::vector<Decision> judged(UnconfirmedStretch& stretch, const SurfaceWorld& world, int scans,
@@ -84,7 +89,7 @@ TEST(UnconfirmedStretch, ThatWasFollowedAllAlongIsAPartOfTheMapOnceItsEndIs) {
 
 TEST(UnconfirmedStretch, ThatWasLookedForIsNoPartOfTheMapUntilItIsConfirmed) {
   UnconfirmedStretch stretch = stretch_of_here();
-  stretch.jump(20.0);
+  jump(stretch, 20.0);
   for (int k = 0; k < 30; ++k) {
     const Eigen::Isometry3d T_true = level_pose(0.5 * k, 0.0, 0.0);
     OdometryResult found = good_at(T_true);
@@ -106,7 +111,7 @@ TEST(UnconfirmedStretch, EndsWithScansInARowThatAgreeInThePartThatIsKnown) {
   EXPECT_EQ(decisions, (std::vector<Decision>{open, open, open, open, confirmed}));
   // Looked for, it would be too little.
   UnconfirmedStretch jumped = stretch_of_here();
-  jumped.jump(20.0);
+  jump(jumped, 20.0);
   EXPECT_EQ(judged(jumped, farther, 15, 0.5, Eigen::Isometry3d::Identity()),
             std::vector<Decision>(15, open));
 }
@@ -151,7 +156,7 @@ TEST(UnconfirmedStretch, StaysOpenWhereTheTrustedMapKnowsNothing) {
 TEST(UnconfirmedStretch, SettlesOnceItsMotionWasSeenForLong) {
   UnconfirmedStretch followed = stretch_of_here();
   UnconfirmedStretch jumped = stretch_of_here();
-  jumped.jump(20.0);
+  jump(jumped, 20.0);
   Decision last = open;
   for (unsigned k = 0; k < 100; ++k) {
     EXPECT_EQ(last, open) << k;
@@ -173,17 +178,17 @@ TEST(UnconfirmedStretch, SettlesOnceItsMotionWasSeenForLong) {
 
 TEST(UnconfirmedStretch, AJumpNearbyIsConfirmedByOneScanThatFitsAsUsual) {
   UnconfirmedStretch stretch = stretch_of_here();
-  stretch.jump(1.0);
+  jump(stretch, 1.0);
   EXPECT_EQ(judged(stretch, here(), 1, 0.0, Eigen::Isometry3d::Identity()).back(), confirmed);
 }
 
 TEST(UnconfirmedStretch, AJumpFarOffIsConfirmedOnTheWayAlone) {
   UnconfirmedStretch stands = stretch_of_here();
-  stands.jump(20.0);
+  jump(stands, 20.0);
   const auto standing = judged(stands, here(), 30, 0.0, Eigen::Isometry3d::Identity());
   EXPECT_EQ(standing, std::vector<Decision>(30, open));
   UnconfirmedStretch drives = stretch_of_here();
-  drives.jump(20.0);
+  jump(drives, 20.0);
   const auto driving = judged(drives, here(), 30, 0.5, Eigen::Isometry3d::Identity());
   EXPECT_EQ(driving.back(), confirmed);
   EXPECT_EQ(driving.size(), 11U);
@@ -191,8 +196,38 @@ TEST(UnconfirmedStretch, AJumpFarOffIsConfirmedOnTheWayAlone) {
 
 TEST(UnconfirmedStretch, AJumpToAPlaceThatScansDoNotAgreeOnIsGivenUp) {
   UnconfirmedStretch stretch = stretch_of_here();
-  stretch.jump(20.0);
+  jump(stretch, 20.0);
   EXPECT_EQ(judged(stretch, here(), 30, 0.5, level_pose(0.5, 0.0, 0.0)).back(), contradicted);
+}
+
+TEST(UnconfirmedStretch, KnowsWhereMotionLedThroughItsJumps) {
+  UnconfirmedStretch stretch = stretch_of_here();
+  expect_near(stretch.where_motion_led(level_pose(4.0, 1.0, 0.2)), level_pose(4.0, 1.0, 0.2), 1e-9,
+              1e-9);
+  stretch.jump(level_pose(1.0, 0.0, 0.0), level_pose(1.0, 20.0, 0.5));
+  expect_near(stretch.where_motion_led(level_pose(1.0, 20.0, 0.5) * level_pose(3.0, 0.0, 0.0)),
+              level_pose(4.0, 0.0, 0.0), 1e-9, 1e-9);
+  stretch.jump(level_pose(1.0, 20.0, 0.5) * level_pose(3.0, 0.0, 0.0), level_pose(0.0, 7.0, 0.0));
+  expect_near(stretch.where_motion_led(level_pose(2.0, 7.0, 0.0)), level_pose(6.0, 0.0, 0.0), 1e-9,
+              1e-9);
+}
+
+/// On a bridge no scan shows all of its motion: a small jump gave up all that was driven on it, and
+/// the lidar was said to be where it drove on to it.
+TEST(UnconfirmedStretch, AJumpNearbyIsNotGivenUpFarFromTheTrustedMap) {
+  const auto last_of = [](double x_m) {
+    UnconfirmedStretch stretch = stretch_of_here();
+    jump(stretch, 0.6);
+    Decision last = open;
+    for (unsigned k = 0; k < 40 && last == open; ++k) {
+      OdometryResult found = good_at(level_pose(x_m + k, 0.0, 0.0));
+      found.health = OdometryHealth::degenerate;
+      last = stretch.evaluate({}, {}, found);
+    }
+    return last;
+  };
+  EXPECT_EQ(last_of(60.0), open);
+  EXPECT_EQ(last_of(0.0), contradicted);
 }
 
 }  // namespace
