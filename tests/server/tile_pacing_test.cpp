@@ -227,6 +227,8 @@ TEST_F(StalledTileReader, HoldsUpNeitherEntriesNorRemovals) {
   publisher_.publish(row, Eigen::Vector2d::Zero());
   ASSERT_EQ(publisher_.waiting(), 0U);
   ASSERT_EQ(take([](const auto& entries) { return entries.size() == 3; }).size(), 3U);
+  // The publisher knows a reader that has got something.
+  stalled_.events().wait_for_data({}, 5s);
   auto next = std::make_shared<MapSnapshot>(*with_first_changed(*row, 2));
   next->tiles.erase({1, 0});
   publisher_.publish(next, Eigen::Vector2d::Zero());
