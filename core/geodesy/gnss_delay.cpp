@@ -35,10 +35,12 @@ constexpr double velocity_window_s = 1.0;
 constexpr double fine_step_s = 0.05;
 /// Errors of so many neighbouring fixes are the same.
 constexpr double correlated_fixes = 10.0;
-/// Of a delay of seconds, for each fix and as a share of what there is to gain: it puts what turns
-/// off the way by tens of metres. What lies on the way without it denies it.
-constexpr double min_gain_of_fix = 0.2;
-constexpr double min_gain_share = 0.3;
+/// Of a delay of seconds, in all, for each fix, and as a share of what there is to gain: it puts
+/// what turns off the way by tens of metres. What lies on the way without it denies it; who seldom
+/// turns shows it in few stretches.
+constexpr double min_gain = 5.0;
+constexpr double min_gain_of_fix = 0.02;
+constexpr double min_gain_share = 0.1;
 /// Of delays that gain so much of what the best one does, the shortest is the one: a way that goes
 /// on as it went fits itself a bend later, too.
 constexpr double as_good_share = 0.95;
@@ -391,7 +393,7 @@ std::optional<GnssDelay> estimate_delay(std::span<const PlanPose> way,
   for (int k = -coarse; k <= coarse; ++k) gains.push_back(gain_of(k * coarse_step_s));
   // Who drives the same round again and again fits about as well a round later.
   const double total = gain(without, std::vector<double>(without.size(), 0.0));
-  const double least = std::max({min_gain_of_fix * static_cast<double>(without.size()),
+  const double least = std::max({min_gain, min_gain_of_fix * static_cast<double>(without.size()),
                                  min_gain_share * total, 0.5 * *std::ranges::max_element(gains)});
   std::vector<Candidate> candidates{best_near(0.0, gain_of)};
   for (std::size_t k = 1; k + 1 < gains.size(); ++k) {

@@ -129,7 +129,35 @@ TEST(GnssDelay, IsNotKnownWhereSpeedAndTurnAreTheSameAllTheTime) {
   }
 }
 
-/// The same by odometry that errs from scan to scan, and of a receiver that sees reflections for
+/// A turn by a right angle, to either side by turns, and slower in it; else straight on.
+template <int period_s, int speed_m_s>
+constexpr Course rare_turns{[](double s) {
+                              return std::fmod(s, period_s) > period_s - 8 ? 0.5 * speed_m_s
+                                                                           : 1.0 * speed_m_s;
+                            },
+                            [](double s) {
+                              const double phase_s = std::fmod(s, period_s);
+                              if (phase_s <= period_s - 6 || phase_s >= period_s - 2) return 0.0;
+                              return std::fmod(s, 2 * period_s) < period_s ? 0.39 : -0.39;
+                            }};
+
+TEST(GnssDelay, IsFoundByTurnsThatAreRare) {
+  const auto expect_found = [](const Course& course, double delay_s, double sigma_m) {
+    const Heard heard = driven(course, 600.0, delay_s, sigma_m);
+    const auto found = estimate_delay(heard.way, heard.fixes);
+    ASSERT_TRUE(found && revised({}, *found)) << delay_s << " s, " << sigma_m << " m";
+    EXPECT_NEAR(found->delay_s, delay_s, std::max(0.01, 3.0 * found->sigma_s));
+  };
+  for (const double delay_s : {2.0, 18.0}) {
+    for (const double sigma_m : {0.02, 1.5}) {
+      expect_found(rare_turns<30, 8>, delay_s, sigma_m);
+      expect_found(rare_turns<60, 15>, delay_s, sigma_m);
+      expect_found(rare_turns<90, 15>, delay_s, sigma_m);
+    }
+  }
+}
+
+/// A street by odometry that errs from scan to scan, and of a receiver that sees reflections for
 /// six seconds, by some metres.
 Heard driven_straight(unsigned seed, double sigma_m) {
   constexpr Course street{[](double) { return 8.0; }, [](double) { return 0.0; }};
