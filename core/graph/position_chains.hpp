@@ -25,16 +25,18 @@ struct PositionOnWay {
 
 /// Of which of these positions, in the order of their way, the heights follow each other as
 /// odometry has them, whichever way it has up: those of the largest such chain. None where that is
-/// less than half of them, or where they jump again and again. A receiver's height may jump where
-/// its place does not.
+/// less than half of them, or where they jump again and again (there and back at once is one jump).
+/// A receiver's height may jump where its place does not.
 [[nodiscard]] std::vector<bool> believed_heights(std::span<const PositionOnWay> positions);
 
 /// Sorts measured positions by what they say of the way between them: those that follow each other
 /// as far apart as odometry has them are a chain. A receiver that holds its last position, or sees
 /// reflections, says of the way what is not so, or what nothing before it goes on to; most of what
 /// it says does not. One goes on where the newest chain is that it can: what is off by the same
-/// since some moment stays a chain of its own, however long the way since then. The largest chain
-/// is believed; where heights of it are not, they are unknown.
+/// since some moment stays a chain of its own, however long the way since then. But a larger chain
+/// has it where its newest positions, no long way before, foretell it: a reflection that sets in at
+/// once and fades takes nothing along. The largest chain is believed; where heights of it are not,
+/// they are unknown, and lie where the believed ones have them, or the middle one of all.
 class PositionChains {
  public:
   /// Of one chain, positions count once on so much way, and once on so many of their standard

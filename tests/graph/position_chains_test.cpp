@@ -7,6 +7,7 @@
 #include <functional>
 #include <random>
 #include <span>
+#include <vector>
 
 namespace stillmap {
 namespace {
@@ -109,17 +110,115 @@ TEST(PositionChains, HeightsThatJumpAllTheTimeAreNotBelieved) {
   EXPECT_EQ(heights(chains.believed()), 0U);
 }
 
-TEST(PositionChains, HeightsThatWanderByMetresAreNotBelieved) {
+/// Of heights that wander by metres from fix to fix, the first one off by so much more.
+PositionChains chains_that_wander(double first_off_m) {
   PositionChains chains(5.0, 10.0);
   std::mt19937_64 random(4);
   std::normal_distribution<double> step_m(0.0, 0.4);
   double height_m = 0.0;
   for (int k = 0; k < 600; ++k) {
     height_m = 0.99 * height_m + step_m(random);
-    chains.add(measured(k, place(k) + Eigen::Vector3d(0.0, 0.0, height_m), 0.02));
+    const double off_m = height_m + (k == 0 ? first_off_m : 0.0);
+    chains.add(measured(k, place(k) + Eigen::Vector3d(0.0, 0.0, off_m), 0.02));
   }
+  return chains;
+}
+
+TEST(PositionChains, HeightsThatWanderByMetresAreNotBelieved) {
+  PositionChains chains = chains_that_wander(0.0);
   EXPECT_GE(chains.believed().size(), 100U);
   EXPECT_EQ(heights(chains.believed()), 0U);
+}
+
+/// A fix every 1.6 m of a way of 3 km that bends to and fro, by a receiver whose
+/// errors last, and of which something off sets in at once every 300 m and fades.
+struct LongWay {
+  double sigma_m = 1.0;
+  double lasting = 0.99;
+  Eigen::Vector3d off = Eigen::Vector3d::Zero();
+  Eigen::AngleAxisd tilt = Eigen::AngleAxisd(0.0, Eigen::Vector3d::UnitX());
+};
+
+PositionChains chains_of(const LongWay& said, unsigned seed) {
+  PositionChains chains(5.0, 10.0);
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  std::uniform_real_distribution<double> direction(0.0, 6.28);
+  Eigen::Vector3d error = Eigen::Vector3d::Zero(), off = error;
+  for (int k = 0; k < 1875; ++k) {
+    const Eigen::Vector3d step(normal(random), normal(random), normal(random));
+    error =
+        k == 0
+            ? step
+            : (said.lasting * error + std::sqrt(1.0 - said.lasting * said.lasting) * step).eval();
+    off *= 0.9;
+    if (k % 188 == 94)
+      off = Eigen::AngleAxisd(direction(random), Eigen::Vector3d::UnitZ()) * said.off;
+    const double x = 1.6 * k;
+    const Eigen::Vector3d at(x, 20.0 * std::sin(x / 50.0), 3.0 * std::sin(x / 90.0));
+    PositionOnWay position = measured(k, at + said.sigma_m * error + off, said.sigma_m);
+    position.point_odom = said.tilt * at;
+    position.way_m = x;
+    chains.add(position);
+  }
+  return chains;
+}
+
+TEST(PositionChains, ReflectionsThatSetInAtOnceAndFadeTakeNothingAlong) {
+  for (const double tilt_rad : {0.0, 1.0}) {
+    const Eigen::AngleAxisd tilt(tilt_rad, Eigen::Vector3d(0.6, 0.8, 0.0));
+    for (const double sigma_m : {0.05, 1.0}) {
+      for (unsigned seed = 0; seed < 3; ++seed) {
+        PositionChains chains = chains_of(
+            {.sigma_m = sigma_m, .off = {8.0 * sigma_m + 4.0, 0.0, 0.0}, .tilt = tilt}, seed);
+        const std::size_t all = sigma_m < 0.5 ? 469 : 268;
+        EXPECT_GE(chains.believed().size(), all * 9 / 10)
+            << tilt_rad << ' ' << sigma_m << ' ' << seed << ' ' << chains.disbelieved();
+      }
+    }
+  }
+}
+
+TEST(PositionChains, HeightsThatAreOffAtOnceAndFadeTakeNothingAlong) {
+  for (const double sigma_m : {0.05, 1.0}) {
+    for (unsigned seed = 0; seed < 3; ++seed) {
+      PositionChains chains =
+          chains_of({.sigma_m = sigma_m, .off = {0.0, 0.0, 8.0 * sigma_m + 4.0}}, seed);
+      const auto believed = chains.believed();
+      EXPECT_EQ(chains.disbelieved(), 0U);
+      EXPECT_GE(heights(believed), believed.size() * 7 / 10) << sigma_m;
+    }
+  }
+}
+
+TEST(PositionChains, NoiseFromFixToFixIsOneChain) {
+  for (const double sigma_m : {1.0, 2.0}) {
+    for (unsigned seed = 0; seed < 3; ++seed) {
+      PositionChains chains = chains_of({.sigma_m = sigma_m, .lasting = 0.0}, seed);
+      EXPECT_GE(chains.believed().size(), sigma_m < 1.5 ? 260U : 140U)
+          << seed << ' ' << chains.disbelieved();
+    }
+  }
+}
+
+TEST(PositionChains, OneHeightOfTwelveMayBeOff) {
+  std::vector<PositionOnWay> positions;
+  for (int k = 0; k < 240; ++k) {
+    positions.push_back(measured(k, {10.0 * k, 0.0, k % 12 == 6 ? 30.0 : 0.0}));
+    positions.back().point_odom = {10.0 * k, 0.0, 0.0};
+    positions.back().way_m = 10.0 * k;
+  }
+  const std::vector<bool> believed = believed_heights(positions);
+  EXPECT_EQ(std::ranges::count(believed, true), 220);
+}
+
+// Without any of them, that of the first one alone would be all that tells.
+TEST(PositionChains, WithoutHeightsTheyAreWhereMostHaveThem) {
+  PositionChains chains = chains_that_wander(90.0);
+  const auto believed = chains.believed();
+  ASSERT_EQ(heights(believed), 0U);
+  for (const PositionMeasurement& position : believed)
+    EXPECT_NEAR(position.position_enu.z(), 0.0, 10.0);
 }
 
 // Without an IMU a map is as level as its first scan's lidar was.
