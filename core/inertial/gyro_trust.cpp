@@ -9,13 +9,15 @@ namespace {
 constexpr double proof_rad = 0.035;
 constexpr double max_missed_share = 0.1;
 /// Where a lidar shakes within its sweeps registration errs by more than that without the gyro.
-/// Over more scans, and 4 degrees, its errors are like no turn: what is missed is less than this
-/// share of what is registered and of what repetition misses, and has no more than this in common
-/// with what the gyro tells. It has all where that is in other units, about other axes, or late by
-/// half a swing.
+/// Over more scans with a turn, and 4 degrees, its errors are like no turn: what is missed is less
+/// than this share of what is registered and of what repetition misses, and has no more than this
+/// in common with what the gyro tells. It has all where that is in other units, about other axes,
+/// or late by half a swing.
+constexpr double min_shaken_turns = 15.0;
+constexpr double min_turn_rad = 0.01;
 constexpr double proof_of_shaken_rad = 0.07;
 constexpr double max_missed_share_of_shaken = 0.8;
-constexpr double max_common_share = 0.4;
+constexpr double max_common_share = 0.15;
 constexpr double shaken_memory = 0.98;
 /// Older scans count this much less with each scan.
 constexpr double proof_memory = 0.95;
@@ -51,6 +53,7 @@ void GyroTrust::Shaken::add(const Eigen::Vector3d& registered,
                             const Eigen::Vector3d& missed_by_gyro,
                             const Eigen::Vector3d& missed_by_repetition) {
   const Eigen::Vector3d by_gyro = registered - missed_by_gyro;
+  turns_ = shaken_memory * turns_ + (by_gyro.norm() > min_turn_rad ? 1.0 : 0.0);
   registered_ = shaken_memory * registered_ + registered.squaredNorm();
   missed_ = shaken_memory * missed_ + missed_by_gyro.squaredNorm();
   missed_by_repetition_ =
@@ -62,8 +65,8 @@ void GyroTrust::Shaken::add(const Eigen::Vector3d& registered,
 bool GyroTrust::Shaken::is_foretold() const {
   const double bearable =
       square(max_missed_share_of_shaken) * std::min(registered_, missed_by_repetition_);
-  return by_gyro_.trace() > square(proof_of_shaken_rad) && missed_ < bearable &&
-         common_.norm() < max_common_share * by_gyro_.norm();
+  return turns_ > min_shaken_turns && by_gyro_.trace() > square(proof_of_shaken_rad) &&
+         missed_ < bearable && common_.norm() < max_common_share * by_gyro_.norm();
 }
 
 void GyroTrust::withdraw() {

@@ -35,6 +35,8 @@ class GyroTrust {
     [[nodiscard]] bool is_foretold() const;
 
    private:
+    /// Scans in which the gyro tells a turn, the older the less.
+    double turns_ = 0.0;
     double registered_ = 0.0;
     double missed_ = 0.0;
     double missed_by_repetition_ = 0.0;

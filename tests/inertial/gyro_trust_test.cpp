@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -58,11 +59,41 @@ TEST(GyroTrust, BelievesAGyroThatForetellsWhatShakesTheLidar) {
   GyroTrust trust;
   shake(trust, 1.0, 100);
   EXPECT_TRUE(trust.is_believed());
-  for (const double factor : {57.3, 1.0 / 57.3, -1.0, 0.0, 0.5}) {
+  for (const double factor : {57.3, 1.0 / 57.3, -1.0, 0.0, 0.5, 1.3}) {
     GyroTrust wrong;
     shake(wrong, factor, 200);
     EXPECT_FALSE(wrong.is_believed()) << factor;
   }
+}
+
+/// Every 6 s it turns on the spot by 90 degrees, at full rate within 0.2 s: all that repetition
+/// misses is where turns set in and end.
+void turn_smoothly(GyroTrust& trust, double factor, int scans) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> error(0.0, 0.05 * deg);
+  Eigen::Vector3d last = Eigen::Vector3d::Zero();
+  for (int k = 0; k < scans; ++k) {
+    const int phase = k % 60;
+    const double share =
+        phase < 30 || phase > 44 ? 0.0 : std::min({(phase - 29) / 2.0, 1.0, (45 - phase) / 2.0});
+    const Eigen::Vector3d rotation(0.0, 0.0, 6.0 * deg * share);
+    const Eigen::Vector3d registered =
+        rotation + Eigen::Vector3d(error(random), error(random), error(random));
+    trust.add(registered, registered - factor * rotation, registered - last);
+    last = registered;
+  }
+}
+
+TEST(GyroTrust, IsNotWonByTheOnsetOfATurnThatItGetsWrong) {
+  for (const double factor : {0.72, 0.8, 1.2, 1.3, 1.6}) {
+    GyroTrust trust;
+    turn_smoothly(trust, factor, 600);
+    EXPECT_FALSE(trust.is_believed()) << factor;
+    EXPECT_EQ(trust.losses(), 0) << factor;
+  }
+  GyroTrust right;
+  turn_smoothly(right, 1.0, 60);
+  EXPECT_TRUE(right.is_believed());
 }
 
 TEST(GyroTrust, IsNotWonByTheNoiseOfALidarThatRests) {
