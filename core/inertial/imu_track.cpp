@@ -13,16 +13,20 @@ constexpr std::size_t max_samples = 8000;
 constexpr int samples_after_clock_was_set = 100;
 /// Noise makes no sample like the one before: so many alike are those of a broken sensor.
 constexpr int max_repetitions = 10;
-/// So many rates that differ from one sample to the next are those of a gyro with noise.
-constexpr int min_changes = 10;
+/// Rates that grow and shrink by turns so often, each time within so many samples, and by more than
+/// this, are those of a gyro with noise. Those of a turn of a simulated robot only grow, or shrink.
+constexpr int min_reversals = 8;
+constexpr int max_samples_to_reversal = 4;
+constexpr double min_noise_rad_s = 1e-5;
 /// A rate of such a gyro above this [rad/s] that is the same in more samples than this is the end
 /// of its range: the least that are sold go to 2 rad/s.
 constexpr double min_saturated_rate = 1.0;
 constexpr int max_fast_repetitions = 4;
 /// Up to three samples are a glitch where they differ from the median of the six others next to
-/// them by more than any robot's turn changes from one sample to the next, and than those differ
-/// among themselves: by this many times their median difference.
+/// them by more than any robot's turn changes, and than those differ among themselves: by this many
+/// times their median difference. The median is that of two samples away at the peak of a jolt.
 constexpr std::ptrdiff_t samples_round_glitch = 6;
+constexpr double samples_to_median = 2.0;
 constexpr double min_glitch_rad_s = 1.0;
 constexpr double max_angular_acceleration = 200.0;
 constexpr double min_glitch_deviations = 8.0;
@@ -74,11 +78,12 @@ Eigen::Quaterniond rotation_by(const Eigen::Vector3d& rotation_vector) {
 bool ImuTrack::tells_rate(const Entry& entry) {
   if (entry.repetitions >= max_repetitions) return false;
   // A simulated one without noise may say the same for long, and be right.
-  const auto has_noise = entry.rate_changes >= min_changes;
-  const bool is_stuck = (entry.rate_repetitions >= max_repetitions).all() && has_noise.any();
-  const bool is_saturated = (entry.sample.angular_velocity_imu.array().abs() > min_saturated_rate &&
-                             entry.rate_repetitions >= max_fast_repetitions && has_noise)
-                                .any();
+  if ((entry.noisy_reversals < min_reversals).all()) return true;
+  const Eigen::Array3d rate = entry.sample.angular_velocity_imu.array();
+  // Some gyros say zero as long as they rest.
+  const bool is_stuck = (entry.rate_repetitions >= max_repetitions).all() && (rate != 0.0).any();
+  const bool is_saturated =
+      (rate.abs() > min_saturated_rate && entry.rate_repetitions >= max_fast_repetitions).any();
   return !is_stuck && !is_saturated;
 }
 
@@ -106,11 +111,39 @@ Eigen::Vector3d ImuTrack::rate_without_glitch(std::ptrdiff_t index) const {
           at(first + k + (first + k >= index ? 1 : 0)).angular_velocity_imu(axis);
     const double median = median_of(others);
     for (double& other : others) other = std::abs(other - median);
-    const double bearable = std::max({min_glitch_rad_s, max_angular_acceleration * step_s,
-                                      min_glitch_deviations * median_of(others)});
+    const double bearable =
+        std::max({min_glitch_rad_s, max_angular_acceleration * samples_to_median * step_s,
+                  min_glitch_deviations * median_of(others)});
     if (std::abs(rate(axis) - median) > bearable) rate(axis) = median;
   }
   return rate;
+}
+
+void ImuTrack::compare(const Entry& last, Entry& entry) {
+  // Counts end where they tell enough: an IMU may run for months.
+  if (says_the_same(last.sample, entry.sample))
+    entry.repetitions = std::min(last.repetitions + 1, max_repetitions);
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const double step =
+        entry.sample.angular_velocity_imu(axis) - last.sample.angular_velocity_imu(axis);
+    entry.rate_direction(axis) = last.rate_direction(axis);
+    entry.noisy_reversals(axis) = last.noisy_reversals(axis);
+    entry.since_reversal(axis) =
+        std::min(last.since_reversal(axis) + 1, max_samples_to_reversal + 1);
+    if (step == 0.0) {
+      entry.rate_repetitions(axis) = std::min(last.rate_repetitions(axis) + 1, max_repetitions);
+      continue;
+    }
+    // Of a coarse scale two in a row may be the same.
+    if (last.rate_repetitions(axis) > 1) entry.noisy_reversals(axis) = 0;
+    if (std::abs(step) < min_noise_rad_s) continue;
+    const int direction = step > 0.0 ? 1 : -1;
+    if (direction == last.rate_direction(axis)) continue;
+    if (entry.since_reversal(axis) <= max_samples_to_reversal)
+      entry.noisy_reversals(axis) = std::min(entry.noisy_reversals(axis) + 1, min_reversals);
+    entry.rate_direction(axis) = direction;
+    entry.since_reversal(axis) = 0;
+  }
 }
 
 ImuSampleFate ImuTrack::add(const ImuSample& sample) {
@@ -121,17 +154,7 @@ ImuSampleFate ImuTrack::add(const ImuSample& sample) {
   }
   out_of_order_ = 0;
   Entry entry{.sample = sample, .rate_imu = sample.angular_velocity_imu};
-  if (!entries_.empty()) {
-    const Entry& last = entries_.back();
-    if (says_the_same(last.sample, sample)) entry.repetitions = last.repetitions + 1;
-    const auto repeats =
-        sample.angular_velocity_imu.array() == last.sample.angular_velocity_imu.array();
-    entry.rate_repetitions = repeats.select(last.rate_repetitions + 1, 0);
-    // Of a coarse scale two in a row may be the same.
-    const auto goes_on = last.rate_repetitions <= 1;
-    entry.rate_changes =
-        repeats.select(last.rate_changes, goes_on.select(last.rate_changes + 1, 1));
-  }
+  if (!entries_.empty()) compare(entries_.back(), entry);
   entries_.push_back(entry);
   if (entries_.size() > max_samples) entries_.pop_front();
   // The newest ones are judged again by those that come after them.

@@ -65,13 +65,18 @@ class ImuTrack {
     Eigen::Vector3d rate_imu = Eigen::Vector3d::Zero();
     /// Samples in a row up to this one that say the same.
     int repetitions = 0;
-    /// The same of the rate about each axis, and samples in a row before those whose rates
-    /// differed, as noise has it.
+    /// The same of the rate about each axis.
     Eigen::Array3i rate_repetitions = Eigen::Array3i::Zero();
-    Eigen::Array3i rate_changes = Eigen::Array3i::Zero();
+    /// Whether the rate last grew or shrank (1, -1), and samples since it did the other.
+    Eigen::Array3i rate_direction = Eigen::Array3i::Zero();
+    Eigen::Array3i since_reversal = Eigen::Array3i::Zero();
+    /// How often it went to and fro between few samples, as noise does, without a repetition.
+    Eigen::Array3i noisy_reversals = Eigen::Array3i::Zero();
   };
   using Entries = std::deque<Entry>;
 
+  /// Counts of an entry how often what the one before it says is repeated, and what noise it has.
+  static void compare(const Entry& last, Entry& entry);
   [[nodiscard]] static bool tells_rate(const Entry& entry);
   [[nodiscard]] static Eigen::Vector3d interpolated_rate(const Entry& a, const Entry& b,
                                                          std::int64_t time_ns);

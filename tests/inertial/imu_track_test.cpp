@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -144,6 +145,56 @@ TEST(ImuTrack, SaysNothingWhereTheGyroIsAtTheEndOfItsRangeOrStuck) {
   });
   EXPECT_TRUE(stuck.rotation(800 * ms, 900 * ms, no_bias));
   EXPECT_FALSE(stuck.rotation(1100 * ms, 1200 * ms, no_bias));
+}
+
+/// Scans of 0.1 s, of 5 s, of which the track tells how far they turned.
+int told_scans(const ImuTrack& track) {
+  int told = 0;
+  for (int k = 0; k < 50; ++k)
+    told += track.rotation(k * 100 * ms, (k + 1) * 100 * ms, Eigen::Vector3d::Zero()) ? 1 : 0;
+  return told;
+}
+
+/// A turn that sets in and ends within 0.3 s, and stays at `top` for 2 s.
+double turn(double t, double top) {
+  return top * std::clamp(std::min((t - 1.0) / 0.3, (3.6 - t) / 0.3), 0.0, 1.0);
+}
+
+TEST(ImuTrack, TellsTurnsOfASimulatedGyroWithoutNoise) {
+  for (const double top : {0.5, 1.2}) {
+    std::mt19937 random(5);
+    std::normal_distribution<double> noise(0.0, 0.01);
+    ImuTrack track;
+    for (int k = 0; k <= 500; ++k)
+      (void)track.add({k * 10 * ms, {0.0, 0.0, turn(0.01 * k, top)}, {0.0, noise(random), 9.81}});
+    EXPECT_EQ(told_scans(track), 50) << top;
+    EXPECT_NEAR(yaw_between(track, 0, 5000 * ms), 2.3 * top, 0.01);
+  }
+}
+
+TEST(ImuTrack, TellsThatAGyroRestsWhichSaysZeroThen) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0.0, 0.003);
+  ImuTrack track;
+  for (int k = 0; k <= 500; ++k) {
+    Eigen::Vector3d rate(noise(random), noise(random), turn(0.01 * k, 0.5));
+    if (rate.z() == 0.0) rate.setZero();
+    (void)track.add({k * 10 * ms, rate, {0.0, noise(random), 9.81}});
+  }
+  EXPECT_EQ(told_scans(track), 50);
+}
+
+TEST(ImuTrack, TurnsByAJolt) {
+  // By 20 ms of a wheel on a stone, 188 rad/s2 at its steepest.
+  for (const double late : {0.0, 0.25, 0.5}) {
+    const ImuTrack track = noisy_track(
+        [&](double t) {
+          const double phase = (t - 0.5) / 0.02 - 0.25 * late;
+          return phase > 0.0 && phase < 1.0 ? 1.2 * std::sin(M_PI * phase) : 0.0;
+        },
+        [](int, Eigen::Vector3d&) {});
+    EXPECT_NEAR(yaw_between(track, 400 * ms, 600 * ms), 0.0153, 0.002) << late;
+  }
 }
 
 TEST(ImuTrack, LeavesOutWhatIsNoMeasurement) {
