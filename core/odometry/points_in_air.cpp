@@ -1,6 +1,7 @@
 #include "core/odometry/points_in_air.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
@@ -26,6 +27,41 @@ constexpr float cube_of_shell_m(std::uint32_t shell) {
   return first_cube_m * static_cast<float>(1U << shell);
 }
 
+/// Rays by their elevation, as if they went all round: no more than there are. The rings of many
+/// lidars lie closer together at the horizon than below it.
+class RayDensity {
+ public:
+  explicit RayDensity(std::span<const Eigen::Vector3f> points) {
+    constexpr std::size_t one_of = 7;
+    std::array<std::size_t, bins> counts{};
+    for (std::size_t i = 0; i < points.size(); i += one_of) counts[bin_of(points[i])] += one_of;
+    for (std::size_t bin = 0; bin < bins; ++bin) {
+      const std::size_t first = bin == 0 ? 0 : bin - 1;
+      const std::size_t last = std::min(bin + 1, bins - 1);
+      std::size_t count = 0;
+      for (std::size_t k = first; k <= last; ++k) count += counts[k];
+      const float steradians =
+          2.0F * std::numbers::pi_v<float> * bin_sine * static_cast<float>(last - first + 1);
+      per_steradian_[bin] = static_cast<float>(count) / steradians;
+      most_per_steradian_ = std::max(most_per_steradian_, per_steradian_[bin]);
+    }
+  }
+  [[nodiscard]] float per_steradian(const Eigen::Vector3f& point) const {
+    return per_steradian_[bin_of(point)];
+  }
+  [[nodiscard]] float most_per_steradian() const { return most_per_steradian_; }
+
+ private:
+  static constexpr std::size_t bins = 50;
+  static constexpr float bin_sine = 2.0F / static_cast<float>(bins);
+  static std::size_t bin_of(const Eigen::Vector3f& point) {
+    const float sine = point.z() / std::max(point.norm(), 1e-3F);
+    return std::min(static_cast<std::size_t>(std::max(sine + 1.0F, 0.0F) / bin_sine), bins - 1);
+  }
+  std::array<float, bins> per_steradian_{};
+  float most_per_steradian_ = 0.0F;
+};
+
 /// Points within reach, by cubes.
 class NearCubes {
  public:
@@ -37,17 +73,20 @@ class NearCubes {
     }
   }
   /// Whether less than the share that is solid of the rays through the cube of the i-th point end
-  /// there.
+  /// there, and it is on no level surface.
   [[nodiscard]] bool is_in_air(std::size_t i, const Eigen::Vector3f& point,
-                               float rays_per_steradian) const {
+                               const RayDensity& rays) const {
     if (places_[i] == outside) return false;
     const std::uint32_t shell = places_[i] / shell_size;
     const float cube_m = cube_of_shell_m(shell);
     const float squared_cube_m2 = cube_m * cube_m;
-    const float rays_through =
-        rays_per_steradian * squared_cube_m2 / std::max(point.squaredNorm(), squared_cube_m2);
+    const float steradians = squared_cube_m2 / std::max(point.squaredNorm(), squared_cube_m2);
     const float max_share = max_share_in_air / static_cast<float>(1U << shell);
-    return static_cast<float>(counts_[places_[i]]) < max_share * rays_through;
+    const auto count = static_cast<float>(counts_[places_[i]]);
+    // Most points are on something solid by far.
+    if (count >= max_share * steradians * rays.most_per_steradian()) return false;
+    const float max_count = max_share * steradians * rays.per_steradian(point);
+    return count < max_count && !is_on_level_surface(places_[i], max_count);
   }
 
  private:
@@ -71,31 +110,48 @@ class NearCubes {
     return outside;
   }
 
+  /// Whether `max_count` points and more lie in a cube and the one above or below it, on average of
+  /// those beside it, and hardly any above or below these two: a level surface, which rays may meet
+  /// at a flat angle, where cubes meet, or in but a corner of a cube. Rain goes on.
+  [[nodiscard]] bool is_on_level_surface(std::uint32_t place, float max_count) const {
+    const auto z = static_cast<int>(place / (side * side) % side);
+    const auto is_surface = [&](int low) {
+      constexpr float few = 0.125F;
+      const float count = mean_count_of_level(place, low) + mean_count_of_level(place, low + 1);
+      return count >= max_count && std::max(mean_count_of_level(place, low - 1),
+                                            mean_count_of_level(place, low + 2)) < few * count;
+    };
+    return is_surface(z) || is_surface(z - 1);
+  }
+  /// Of the cubes of its shell up to one away from its column.
+  [[nodiscard]] float mean_count_of_level(std::uint32_t place, int level) const {
+    if (level < 0 || level >= static_cast<int>(side)) return 0.0F;
+    const auto z = static_cast<std::uint32_t>(level);
+    const std::uint32_t shell = place / shell_size;
+    const std::uint32_t x = place % side;
+    const std::uint32_t y = place / side % side;
+    const auto is_inner = [](std::uint32_t k) { return k >= side / 4 && k < side - side / 4; };
+    float count = 0.0F;
+    float cubes = 0.0F;
+    for (std::uint32_t v = y == 0 ? 0 : y - 1; v <= std::min(y + 1, side - 1); ++v)
+      for (std::uint32_t u = x == 0 ? 0 : x - 1; u <= std::min(x + 1, side - 1); ++u) {
+        // There smaller cubes have the points.
+        if (shell > 0 && is_inner(u) && is_inner(v) && is_inner(z)) continue;
+        count += static_cast<float>(counts_[shell * shell_size + (z * side + v) * side + u]);
+        cubes += 1.0F;
+      }
+    return count / std::max(cubes, 1.0F);
+  }
+
   std::vector<std::uint32_t> counts_;
   std::vector<std::uint32_t> places_;
 };
-
-/// As if they went all round, between the outermost elevations: no more than there are.
-float rays_per_steradian(std::span<const Eigen::Vector3f> points) {
-  constexpr std::size_t one_of = 7;
-  float low = 1.0F;
-  float high = -1.0F;
-  for (std::size_t i = 0; i < points.size(); i += one_of) {
-    const Eigen::Vector3f& point = points[i];
-    const float sine = point.z() / std::max(point.norm(), 1e-3F);
-    low = std::min(low, sine);
-    high = std::max(high, sine);
-  }
-  constexpr float min_band = 0.1F;
-  return static_cast<float>(points.size()) /
-         (2.0F * std::numbers::pi_v<float> * std::max(high - low, min_band));
-}
 
 }  // namespace
 
 std::vector<bool> points_in_air(std::span<const Eigen::Vector3f> points_lidar) {
   const NearCubes cubes(points_lidar);
-  const float rays = rays_per_steradian(points_lidar);
+  const RayDensity rays(points_lidar);
   std::vector<bool> in_air(points_lidar.size());
   std::size_t count = 0;
   for (std::size_t i = 0; i < points_lidar.size(); ++i) {

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
@@ -61,7 +63,7 @@ struct Rain {
 };
 
 TEST(PointsInAir, AreDropsAndNothingSolid) {
-  for (const double share : {0.03, 0.05, 0.10}) {
+  for (const double share : {0.03, 0.05, 0.10, 0.20}) {
     const Rain rain(share, 7);
     const std::vector<bool> in_air = points_in_air(rain.points_lidar);
     ASSERT_EQ(in_air.size(), rain.points_lidar.size()) << share;
@@ -96,6 +98,37 @@ TEST(PointsInAir, AreNoneInClearAirAndInEmptyScans) {
   EXPECT_TRUE(points_in_air({}).empty());
   const std::vector<Eigen::Vector3f> at_the_lidar(100, Eigen::Vector3f::Zero());
   EXPECT_TRUE(points_in_air(at_the_lidar).empty());
+}
+
+/// Rings [degrees] as a VLP-32C has them: close together at the horizon, far apart below it.
+constexpr std::array uneven_rings{-25.0,  -15.639, -11.31, -8.843, -7.254, -6.148, -5.333, -4.667,
+                                  -4.0,   -3.667,  -3.333, -3.0,   -2.667, -2.333, -2.0,   -1.667,
+                                  -1.333, -1.0,    -0.667, -0.333, 0.0,    0.333,  0.667,  1.0,
+                                  1.333,  1.667,   2.333,  3.333,  4.667,  7.0,    10.333, 15.0};
+
+/// Ground, and walls all round, below and about a lidar with these rings.
+std::vector<Eigen::Vector3f> low_lidar_scan(double height_m, double walls_m) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0.0, 0.01);
+  std::vector<Eigen::Vector3f> points;
+  for (const double ring_deg : uneven_rings)
+    for (int column = 0; column < 900; ++column) {
+      const double elevation = ring_deg * std::numbers::pi / 180.0;
+      const double azimuth = 2.0 * std::numbers::pi * column / 900;
+      const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
+                                std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+      const double wall_m = walls_m / ray.head<2>().cwiseAbs().maxCoeff();
+      const double ground_m = ray.z() < 0.0 ? -height_m / ray.z() : wall_m;
+      points.push_back(((std::min(wall_m, ground_m) + noise(random)) * ray).cast<float>());
+    }
+  return points;
+}
+
+TEST(PointsInAir, AreNoneOfTheGroundBelowALowLidarOfUnevenRings) {
+  for (const double height_m : {0.3, 0.6})
+    for (const double walls_m : {2.0, 5.0, 15.0})
+      EXPECT_TRUE(points_in_air(low_lidar_scan(height_m, walls_m)).empty())
+          << height_m << " m high, walls " << walls_m << " m away";
 }
 
 TEST(ExtractSurfaces, LeavesOutWhatHangsInTheAir) {
