@@ -162,19 +162,16 @@ namespace {
 /// Lidars that lean less than this are taken to stand upright: a slope of this much is level
 /// ground, too [rad].
 constexpr float max_lean_rad = 0.17F;
-
-/// Turns what a lidar on its side sees upright.
-Eigen::Matrix3f upright_rotation(const Eigen::Vector3f& up_lidar) {
-  if (up_lidar.z() > std::cos(max_lean_rad)) return Eigen::Matrix3f::Identity();
-  return Eigen::Quaternionf::FromTwoVectors(up_lidar, Eigen::Vector3f::UnitZ()).toRotationMatrix();
-}
+/// Those that lean more are held so. Between, the robot may be on a slope, which is its level
+/// ground.
+constexpr float max_slope_rad = 0.7F;
 
 /// Where every column of the scan has points, in slices of its height.
 class ColumnHeights {
  public:
   ColumnHeights(std::span<const Eigen::Vector3f> points, std::span<const std::uint32_t> chosen,
-                const Eigen::Vector3f& up_lidar)
-      : R_upright_lidar_(upright_rotation(up_lidar)) {
+                Eigen::Matrix3f R_upright_lidar)
+      : R_upright_lidar_(std::move(R_upright_lidar)) {
     slices_.reserve(chosen.size());
     for (const std::uint32_t i : chosen) {
       const Eigen::Vector3f point = R_upright_lidar_ * points[i];
@@ -223,6 +220,25 @@ class ColumnHeights {
   tsl::robin_map<std::uint64_t, Range, IndexHash> slices_;
 };
 
+/// Columns along the map's z where the lidar leans; on slopes, along that of the two in which less
+/// stands up.
+ColumnHeights upright_columns(std::span<const Eigen::Vector3f> points,
+                              std::span<const std::uint32_t> chosen,
+                              const Eigen::Vector3f& up_lidar) {
+  const auto own = [&] { return ColumnHeights(points, chosen, Eigen::Matrix3f::Identity()); };
+  if (up_lidar.z() > std::cos(max_lean_rad)) return own();
+  const auto R_upright_lidar =
+      Eigen::Quaternionf::FromTwoVectors(up_lidar, Eigen::Vector3f::UnitZ()).toRotationMatrix();
+  ColumnHeights by_map(points, chosen, R_upright_lidar);
+  if (up_lidar.z() < std::cos(max_slope_rad)) return by_map;
+  ColumnHeights by_lidar = own();
+  const auto standing = [&](const ColumnHeights& columns) {
+    return std::ranges::count_if(chosen,
+                                 [&](std::uint32_t i) { return columns.stands_up(points[i]); });
+  };
+  return standing(by_map) < standing(by_lidar) ? by_map : by_lidar;
+}
+
 /// All points of the scan but those in the air, as points_in_air() has them: these are round the
 /// lidar wherever it goes.
 std::vector<std::uint32_t> solid_points(const Scan& scan, const std::vector<bool>& in_air) {
@@ -262,7 +278,7 @@ void pick_points(const Scan& scan, std::vector<std::uint32_t> spaced, double sha
   constexpr std::size_t max_upright = 800;
   constexpr std::size_t max_level = 300;
   features.points = std::move(spaced);
-  const ColumnHeights columns(scan.points_lidar, features.points, up_lidar);
+  const ColumnHeights columns = upright_columns(scan.points_lidar, features.points, up_lidar);
   std::vector<std::uint32_t> upright, level;
   for (const std::uint32_t i : voxel_downsample(scan.points_lidar, features.points, spacing_m))
     (columns.stands_up(scan.points_lidar[i]) ? upright : level).push_back(i);
@@ -297,7 +313,7 @@ Features extract_surfaces(const Scan& scan, const FeatureConfig& config,
   thin_out(1.0);
   const double share = spacing_share(features.surfaces.size(), scan);
   if (share < 1.0) thin_out(share);
-  const ColumnHeights columns(scan.points_lidar, features.planes, up_lidar);
+  const ColumnHeights columns = upright_columns(scan.points_lidar, features.planes, up_lidar);
   features.is_level.resize(scan.size());
   for (const std::uint32_t i : features.surfaces)
     features.is_level[i] = !columns.stands_up(scan.points_lidar[i]);

@@ -252,5 +252,25 @@ TEST(ExtractSurfaces, TellsLevelGroundWhereTheLidarLiesOnItsSide) {
   for (const std::uint32_t i : features.level_points) EXPECT_FALSE(is_wall[i]);
 }
 
+TEST(ExtractSurfaces, TellsLevelGroundBelowARobotOnASlopeAndALidarThatLeansOnItsMount) {
+  std::mt19937 random(1);
+  std::normal_distribution<float> noise(0.0F, 0.02F);
+  const Eigen::Matrix3f R_map_slope =
+      Eigen::AngleAxisf(0.6F, Eigen::Vector3f(1.0F, 1.0F, 0.0F).normalized()).toRotationMatrix();
+  Scan on_slope, on_level_ground;
+  for (float x = -9.0F; x < 9.0F; x += 0.1F)
+    for (float y = -9.0F; y < 9.0F; y += 0.1F) {
+      const Eigen::Vector3f point(x, y, -1.2F + noise(random));
+      on_slope.points_lidar.push_back(point);
+      on_level_ground.points_lidar.push_back(R_map_slope.transpose() * point);
+    }
+  const Eigen::Vector3f up_lidar = R_map_slope.row(2).transpose();
+  for (const Scan* scan : {&on_slope, &on_level_ground}) {
+    const Features features = extract_surfaces(*scan, FeatureConfig{}, up_lidar);
+    for (const std::uint32_t i : features.surfaces) EXPECT_TRUE(features.is_level[i]);
+    EXPECT_TRUE(features.upright_points.empty());
+  }
+}
+
 }  // namespace
 }  // namespace stillmap
