@@ -275,8 +275,11 @@ void Mapper::teach_inertial(std::int64_t middle_ns, const Odometry::Step& step) 
     const Eigen::Matrix3d R_last_middle =
         last_middle_->T_map_lidar.linear().transpose() * T_map_lidar.linear();
     const bool is_good = step.result.health == OdometryHealth::good;
-    is_good ? inertial_.learn(last_middle_->stamp_ns, middle_ns, R_last_middle)
-            : inertial_.judge(last_middle_->stamp_ns, middle_ns, R_last_middle);
+    if (is_good) {
+      inertial_.learn(last_middle_->stamp_ns, middle_ns, R_last_middle);
+    } else {
+      inertial_.judge(last_middle_->stamp_ns, middle_ns, R_last_middle);
+    }
   }
   last_middle_ = StampedPose{middle_ns, T_map_lidar};
 }

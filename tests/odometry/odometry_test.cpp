@@ -183,7 +183,6 @@ TEST_F(OdometrySequence, PriorReplacesThePrediction) {
   expect_near(step.result.T_map_lidar, T_true, 0.1, 0.01);
 }
 
-// A flash lidar, say, whose stamp is that of the message.
 /// The prior of the first scan, as a mount gives it, tells which way is up: what is level by the
 /// lidar's own axes are walls.
 TEST(Odometry, FollowsALidarOnItsSideInALevelMap) {
@@ -204,6 +203,7 @@ TEST(Odometry, FollowsALidarOnItsSideInALevelMap) {
   }
 }
 
+// A flash lidar, say, whose stamp is that of the message.
 TEST_F(OdometrySequence, PosesAreAtTheStampWhenAllPointsAreOfAnotherTime) {
   for (const double late_scans : {0.5, -0.5}) {
     Odometry odometry(OdometryConfig{}, test::test_lidar());
