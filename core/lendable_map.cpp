@@ -17,10 +17,11 @@ void PosedScan::correct(const MapCorrection& correction) {
 
 void insert_scan(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar,
                  const SensorModel& sensor, StaticMap& map) {
-  map.insert(labelled, T_map_lidar);
-  if (!map.clearing_due()) return;
-  map.clear_seen_through(RangeImageView(labelled.scan, {}, sensor, T_map_lidar),
-                         labelled.scan.stamp_ns);
+  if (!map.is_clearing()) return map.insert(labelled, T_map_lidar);
+  std::vector<std::uint8_t> is_thin;
+  RangeImageView view(labelled.scan, sensor, T_map_lidar, is_thin);
+  map.insert(labelled, T_map_lidar, is_thin);
+  if (map.clearing_due()) map.clear_seen_through(std::move(view), labelled.scan.stamp_ns);
 }
 
 void LendableMap::insert(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar) {

@@ -58,6 +58,14 @@ int columns_for_half_a_row(float rows_per_rad, int columns) {
                     std::max(1, columns / 2));
 }
 
+/// What is thin lies so far in front of what the beams above and below it hit [m].
+constexpr float min_gap_m = 0.5F;
+/// Points of a pixel that are farther than its nearest one by more are of something else [m].
+constexpr float max_depth_m = 0.3F;
+/// Vehicles have as much space below them, or less: a beam that comes down by no more, behind a
+/// vehicle far away that one beam alone hit, passed below it [m].
+constexpr float min_drop_m = 0.2F;
+
 /// How far below the top of its row, in 256ths of it. The outermost beams may lie beyond.
 std::uint8_t share_of_row(float row, float top) {
   return static_cast<std::uint8_t>(std::clamp(256.0F * (row - top), 0.0F, 255.0F));
@@ -66,7 +74,8 @@ std::uint8_t share_of_row(float row, float top) {
 }  // namespace
 
 RangeImageView::RangeImageView(const Scan& scan, std::span<const SemanticClass> labels,
-                               const SensorModel& sensor, const Eigen::Isometry3d& T_map_lidar)
+                               const SensorModel& sensor, const Eigen::Isometry3d& T_map_lidar,
+                               std::vector<std::uint8_t>* is_thin)
     : rows_(sensor.rings),
       columns_(std::min(sensor.columns, max_columns)),
       fov_up_(static_cast<float>(sensor.fov_up)),
@@ -102,6 +111,21 @@ RangeImageView::RangeImageView(const Scan& scan, std::span<const SemanticClass> 
     const auto row_top = static_cast<float>(pixel / static_cast<std::uint32_t>(columns_));
     below_row_top_[pixel] = is_nearer ? share_of_row(row, row_top) : below_row_top_[pixel];
   }
+  if (is_thin != nullptr) *is_thin = thin_ones(returns);
+}
+
+std::vector<std::uint8_t> RangeImageView::thin_ones(std::span<const Return> returns) const {
+  // Of the outermost beams nothing is known above or below.
+  std::vector<std::uint8_t> is_thin_at(pixels_.size());
+  for (int row = 1; row + 1 < rows_; ++row)
+    for (int column = 0; column < columns_; ++column)
+      is_thin_at[index(row, column)] = is_thin(row, column) ? 1 : 0;
+  std::vector<std::uint8_t> thin(returns.size());
+  std::ranges::transform(returns, thin.begin(), [&](const Return& point) -> std::uint8_t {
+    if (point.pixel == none || is_thin_at[point.pixel] == 0) return 0;
+    return point.range_m <= std::abs(pixels_[point.pixel]) + max_depth_m ? 1 : 0;
+  });
+  return thin;
 }
 
 void RangeImageView::move_to(const Eigen::Isometry3d& T_map_lidar) {
@@ -154,6 +178,37 @@ float RangeImageView::next_range_m(int row, int column, int step) const {
     if (range_m > 0.0F) return range_m;
   }
   return std::numeric_limits<float>::infinity();
+}
+
+RangeImageView::Beside RangeImageView::nearest_beside(int row, int column, int step) const {
+  Beside nearest;
+  for (int offset = -1; offset <= 1; ++offset) {
+    const int c = (column + offset + columns_) % columns_;
+    for (const int r : {row + step, row + 2 * step}) {
+      if (r < 0 || r >= rows_) break;
+      const float range_m = std::abs(pixels_[index(r, c)]);
+      if (range_m > 0.0F && range_m < nearest.range_m) nearest = {range_m, index(r, c)};
+      if (range_m > 0.0F) break;
+    }
+  }
+  return nearest;
+}
+
+bool RangeImageView::is_thin(int row, int column) const {
+  const float range_m = std::abs(pixels_[index(row, column)]);
+  if (range_m == 0.0F) return false;
+  const float behind_m = range_m + min_gap_m;
+  // What ends most looks comes first: a surface goes on in the next rows.
+  if (next_range_m(row, column, 1) <= behind_m || next_range_m(row, column, -1) <= behind_m)
+    return false;
+  const Beside below = nearest_beside(row, column, 1);
+  if (below.range_m <= behind_m || nearest_beside(row, column, -1).range_m <= behind_m ||
+      std::isinf(below.range_m))
+    return false;
+  const auto below_row = static_cast<float>(below.pixel / static_cast<std::size_t>(columns_)) +
+                         static_cast<float>(below_row_top_[below.pixel]) / 256.0F;
+  const float elevation = fov_up_ - below_row / rows_per_rad_;
+  return elevation >= 0.0F || (below.range_m - range_m) * -std::sin(elevation) >= min_drop_m;
 }
 
 bool RangeImageView::column_sees_past(const Direction& at, int column, float range_m) const {

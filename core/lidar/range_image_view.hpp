@@ -18,7 +18,14 @@ namespace stillmap {
 class RangeImageView {
  public:
   RangeImageView(const Scan& scan, std::span<const SemanticClass> labels, const SensorModel& sensor,
-                 const Eigen::Isometry3d& T_map_lidar);
+                 const Eigen::Isometry3d& T_map_lidar)
+      : RangeImageView(scan, labels, sensor, T_map_lidar, nullptr) {}
+  /// The same without labels. Tells of each point in `is_thin` (1 or 0) whether it is of something
+  /// thin and level, a bar, a chain or a twig, that one beam alone hit: those above and below it go
+  /// on behind it, and that below it comes down by more than there is below a vehicle.
+  RangeImageView(const Scan& scan, const SensorModel& sensor, const Eigen::Isometry3d& T_map_lidar,
+                 std::vector<std::uint8_t>& is_thin)
+      : RangeImageView(scan, {}, sensor, T_map_lidar, &is_thin) {}
 
   /// Where a point is in the image.
   struct Direction {
@@ -60,10 +67,17 @@ class RangeImageView {
     float row = 0.0F;
     float range_m = 0.0F;
   };
+  /// The nearest return up or down from a pixel.
+  struct Beside {
+    float range_m = std::numeric_limits<float>::infinity();
+    std::size_t pixel = 0;
+  };
   struct RowRange {
     float first = std::numeric_limits<float>::max();
     float last = std::numeric_limits<float>::lowest();
   };
+  RangeImageView(const Scan& scan, std::span<const SemanticClass> labels, const SensorModel& sensor,
+                 const Eigen::Isometry3d& T_map_lidar, std::vector<std::uint8_t>* is_thin);
   /// Returns the rows between which the points lie.
   RowRange project(std::span<const Eigen::Vector3f> points_lidar, std::span<Return> returns) const;
   /// `none` outside the field of view, or without a range.
@@ -82,6 +96,11 @@ class RangeImageView {
   /// Of the next row up (-1) or down (1) that measured something in a column, or the next but one;
   /// else infinite.
   [[nodiscard]] float next_range_m(int row, int column, int step) const;
+  /// Up (-1) or down (1), in a column and those on either side of it.
+  [[nodiscard]] Beside nearest_beside(int row, int column, int step) const;
+  /// Which of the scan's points one beam alone hit (see the constructor).
+  [[nodiscard]] std::vector<std::uint8_t> thin_ones(std::span<const Return> returns) const;
+  [[nodiscard]] bool is_thin(int row, int column) const;
   /// Whether the beams above and below a point see past a range in a column.
   [[nodiscard]] bool column_sees_past(const Direction& at, int column, float range_m) const;
 

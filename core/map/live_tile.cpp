@@ -175,12 +175,13 @@ void LiveTile::hit(LiveVoxel& voxel, const TilePoint& point, std::uint32_t scan)
   packed.evidence.add(point.label, point.confidence);
   voxel.last_scan = scan;
   if (point.motion == Motion::semi_static) return;
+  if (point.is_thin) voxel.is_thin = 1;
   // That it is seen again says that it was no part of what moved on.
   if (is_new_scan && voxel.misses == misses_of_rest) voxel.misses = 0;
   if (is_new_scan && voxel.hits < max_count) {
     ++voxel.hits;
     // What stays where space was free for long becomes part of the static world in the end.
-    if (voxel.hits % hits_to_settle == 0) voxel.misses = (voxel.misses / 2U) & 0x3FFFU;
+    if (voxel.hits % hits_to_settle == 0) voxel.misses = (voxel.misses / 2U) & 0x1FFFU;
   }
   if (packed.point_count < PackedVoxel::max_mean_points) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -205,9 +206,9 @@ bool LiveTile::clear_seen_through(const VisibilityTest& test, std::uint32_t scan
     const bool is_new = voxel.first_scan > test.last_scan_cleared && test.times_free_before;
     if (voxel.last_scan == scan && !is_new) return;
     const Eigen::Vector3f position_map = mean_map(voxel);
-    const bool is_thin = is_surely_thin(voxel);
-    std::uint32_t misses = is_new ? test.times_free_before(position_map, is_thin) : 0;
-    if (voxel.last_scan != scan && test.is_free(position_map, is_thin)) ++misses;
+    const Thin thin_by = thin(voxel);
+    std::uint32_t misses = is_new ? test.times_free_before(position_map, thin_by) : 0;
+    if (voxel.last_scan != scan && test.is_free(position_map, thin_by)) ++misses;
     if (misses == 0) return;
     const bool was_hidden = is_seen_through(voxel, rule);
     const bool was_rest = voxel.misses == misses_of_rest;
@@ -389,7 +390,7 @@ void LiveTile::add(const PackedVoxels& known,
     live.first_scan = scan_of[known.first_stamp(i)];
     live.last_scan = scan_of[known.last_stamp(i)];
     live.hits = counts.hits;
-    live.misses = std::min(counts.misses, misses_of_rest) & 0x3FFFU;
+    live.misses = std::min(counts.misses, misses_of_rest) & 0x1FFFU;
     live.was_shown = counts.was_shown ? 1 : 0;
     live.is_restored = counts.is_restored ? 1 : 0;
   }

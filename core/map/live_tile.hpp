@@ -31,6 +31,8 @@ struct TilePoint {
   /// Semi-static points add evidence to existing voxels and create none; of highly dynamic points
   /// only the place is recorded.
   Motion motion = Motion::stationary;
+  /// One beam alone hit something thin there (RangeImageView).
+  bool is_thin = false;
   float confidence = 0.0F;
 };
 
@@ -45,13 +47,17 @@ struct VisibilityRule {
   std::uint32_t label_trust = 3;
 };
 
-/// Whether scans saw through a position of the map frame [m]. Of what is thin (is_thin) a ray must
-/// have gone through the place itself: those on either side of it tell nothing.
+/// Whether something is known to be thinner than beams are apart: labels are sure, or one beam
+/// alone hit it (RangeImageView).
+enum class Thin : std::uint8_t { no, by_labels, by_beam };
+
+/// Whether scans saw through a position of the map frame [m]. Of what is thin a ray must have gone
+/// through the place itself: those on either side of it tell nothing.
 struct VisibilityTest {
   /// A ray of this scan passed it.
-  std::function<bool(const Eigen::Vector3f& position_map, bool is_thin)> is_free;
+  std::function<bool(const Eigen::Vector3f& position_map, Thin thin)> is_free;
   /// How many of the scans before it did, of those that are kept; empty: none are.
-  std::function<std::uint32_t(const Eigen::Vector3f& position_map, bool is_thin)> times_free_before;
+  std::function<std::uint32_t(const Eigen::Vector3f& position_map, Thin thin)> times_free_before;
   /// Voxels that no scan hit until this one are asked how often they were free before.
   std::uint32_t last_scan_cleared = 0;
   /// Those of the tile's scans; null: what is hidden says nothing of what is beside it.
@@ -128,7 +134,9 @@ class LiveTile {
     std::uint32_t first_scan = 0;
     std::uint32_t last_scan = 0;
     std::uint16_t hits = 0;
-    std::uint16_t misses : 14 = 0;
+    std::uint16_t misses : 13 = 0;
+    /// One beam alone hit something thin in it. Not stored.
+    std::uint16_t is_thin : 1 = 0;
     std::uint16_t was_shown : 1 = 0;
     std::uint16_t is_restored : 1 = 0;
   };
@@ -179,8 +187,7 @@ class LiveTile {
   std::size_t restore_excluded(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
                                const VisibilityRule& rule);
   [[nodiscard]] static VoxelHistory history(const LiveVoxel& voxel);
-  /// Whether labels are sure that it is something thin.
-  [[nodiscard]] static bool is_surely_thin(const LiveVoxel& voxel);
+  [[nodiscard]] static Thin thin(const LiveVoxel& voxel);
   /// So many misses hide it, and so many for each hit.
   [[nodiscard]] static std::uint32_t misses_to_clear(const LiveVoxel& voxel,
                                                      const VisibilityRule& rule);

@@ -25,13 +25,15 @@ ScanSorter::ScanSorter(const VoxelGrid& grid, double max_range_m)
       reach_tiles_(static_cast<std::int32_t>(std::ceil(max_range_m / grid.tile_size_m())) + 1) {}
 
 std::span<const ScanSorter::Batch> ScanSorter::sort(const LabelledScan& scan,
-                                                    const Eigen::Isometry3d& T_map_lidar) {
+                                                    const Eigen::Isometry3d& T_map_lidar,
+                                                    std::span<const std::uint8_t> is_thin) {
   batches_.clear();
   const Eigen::Vector3d lidar_map = T_map_lidar.translation();
   if (!grid_.holds(lidar_map)) return {};
   const TileId centre = grid_.index(lidar_map).tile;
   const Window window{{centre.x - reach_tiles_, centre.y - reach_tiles_}, 2 * reach_tiles_ + 1};
   index_points(scan, T_map_lidar, window);
+  for (std::size_t i = 0; i < is_thin.size(); ++i) placed_[i].is_thin = is_thin[i] != 0;
   group_by_tile(window);
   return batches_;
 }
@@ -87,6 +89,7 @@ void ScanSorter::index_point(std::size_t i, const LabelledScan& scan, const Pose
                  static_cast<std::uint8_t>(offset[2])},
                 scan.label(i),
                 scan.motion[i],
+                false,
                 confidence(scan.labels, i)};
 }
 

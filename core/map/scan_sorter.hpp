@@ -23,9 +23,10 @@ class ScanSorter {
   };
 
   /// Tiles hit by points that are mapped: finite, and within range. The batches are valid until the
-  /// next call.
+  /// next call. `is_thin`: of each point (StaticMap::insert), or empty.
   [[nodiscard]] std::span<const Batch> sort(const LabelledScan& scan,
-                                            const Eigen::Isometry3d& T_map_lidar);
+                                            const Eigen::Isometry3d& T_map_lidar,
+                                            std::span<const std::uint8_t> is_thin);
 
  private:
   /// A square of tiles round the lidar; every point within range falls into it.

@@ -107,9 +107,9 @@ struct StaticMap::State {
   }
   /// Whether a ray of the view passed this position.
   [[nodiscard]] bool sees_through(const RangeImageView& view, const Eigen::Vector3f& position_map,
-                                  bool is_thin) const;
+                                  Thin thin) const;
   /// How many of the views that are kept saw through this position.
-  [[nodiscard]] std::uint32_t times_free(const Eigen::Vector3f& position_map, bool is_thin) const;
+  [[nodiscard]] std::uint32_t times_free(const Eigen::Vector3f& position_map, Thin thin) const;
   /// Keeps the view of a scan that cleared.
   void keep(RangeImageView view, std::uint32_t scan);
   void forget_views();
@@ -141,23 +141,24 @@ struct StaticMap::State {
 };
 
 bool StaticMap::State::sees_through(const RangeImageView& view, const Eigen::Vector3f& position_map,
-                                    bool is_thin) const {
+                                    Thin thin) const {
   const double range_m = (position_map - view.origin_map()).norm();
   if (range_m > config.clearing_range_m) return false;
   const auto observation = view.observe(position_map);
   const double margin_m = std::max(config.clearing_margin_m, config.voxel_size_m);
   const double beyond_m = range_m + margin_m + config.clearing_margin_share * range_m;
   if (!observation || !view.sees_past(*observation, static_cast<float>(beyond_m))) return false;
-  // A rail lies between two beams most of the time, and fills less than half of its voxel.
-  return !is_thin ||
-         view.has_beam_near(*observation, static_cast<float>(0.25 * config.voxel_size_m));
+  // A rail lies between two beams most of the time, and fills less than half of its voxel. A beam
+  // above or below it may be that near, too: where labels are sure it takes more than one.
+  const double near_voxels = thin == Thin::by_labels ? 0.25 : 0.2;
+  return thin == Thin::no ||
+         view.has_beam_near(*observation, static_cast<float>(near_voxels * config.voxel_size_m));
 }
 
-std::uint32_t StaticMap::State::times_free(const Eigen::Vector3f& position_map,
-                                           bool is_thin) const {
+std::uint32_t StaticMap::State::times_free(const Eigen::Vector3f& position_map, Thin thin) const {
   return static_cast<std::uint32_t>(std::ranges::count_if(
       past_views,
-      [&](const RangeImageView& view) { return sees_through(view, position_map, is_thin); }));
+      [&](const RangeImageView& view) { return sees_through(view, position_map, thin); }));
 }
 
 void StaticMap::State::enter_session(std::span<LiveTile* const> changing) {
@@ -185,12 +186,14 @@ StaticMap::~StaticMap() = default;
 StaticMap::StaticMap(StaticMap&&) noexcept = default;
 StaticMap& StaticMap::operator=(StaticMap&&) noexcept = default;
 
-void StaticMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar) {
+void StaticMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
+                       std::span<const std::uint8_t> is_thin) {
+  assert(is_thin.empty() || is_thin.size() == scan.scan.size());
   assert(scan.motion.size() == scan.scan.size());
   assert(scan.labels.empty() || scan.labels.classes.size() == scan.scan.size());
   if (state_->is_frozen) return;
   MapTiles& tiles = state_->tiles;
-  const auto batches = state_->sorter.sort(scan, T_map_lidar);
+  const auto batches = state_->sorter.sort(scan, T_map_lidar, is_thin);
   const std::uint32_t number = tiles.stamps().add(scan.scan.stamp_ns);
   std::vector<LiveTile*> hit(batches.size());
   std::ranges::transform(batches, hit.begin(),
@@ -217,9 +220,12 @@ void StaticMap::begin_session(std::uint32_t max_scans) {
 
 void StaticMap::set_frozen(bool is_frozen) { state_->is_frozen = is_frozen; }
 
+bool StaticMap::is_clearing() const {
+  return !state_->is_frozen && state_->config.clearing_range_m > 0.0;
+}
+
 bool StaticMap::clearing_due() const {
-  return !state_->is_frozen && state_->config.clearing_range_m > 0.0 &&
-         state_->inserted % state_->config.clearing_interval == 0;
+  return is_clearing() && state_->inserted % state_->config.clearing_interval == 0;
 }
 
 void StaticMap::clear_seen_through(RangeImageView view, std::int64_t stamp_ns) {
@@ -230,9 +236,9 @@ void StaticMap::clear_seen_through(RangeImageView view, std::int64_t stamp_ns) {
   const std::uint32_t scan = tiles.stamps().add(stamp_ns);
   const VisibilityTest test{
       .is_free = [&](const Eigen::Vector3f& p_map,
-                     bool is_thin) { return state_->sees_through(view, p_map, is_thin); },
+                     Thin thin) { return state_->sees_through(view, p_map, thin); },
       .times_free_before = [&](const Eigen::Vector3f& p_map,
-                               bool is_thin) { return state_->times_free(p_map, is_thin); },
+                               Thin thin) { return state_->times_free(p_map, thin); },
       .last_scan_cleared = state_->last_scan_cleared,
       .stamps = &tiles.stamps()};
   std::vector<std::uint8_t> hides(near.size());

@@ -96,7 +96,10 @@ class StaticMap {
   /// create none; of highly dynamic points only the place is recorded. Points that are not
   /// finite, beyond `max_range_m`, or farther than 100 km from the map's origin are left out.
   /// `scan.motion` is as long as the scan. The result does not depend on the number of threads.
-  void insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar);
+  /// `is_thin` tells of each point whether one beam alone hit something thin there
+  /// (RangeImageView): rays beside it clear no voxel of it then. Empty: of no point.
+  void insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
+              std::span<const std::uint8_t> is_thin = {});
 
   /// What scans of earlier sessions say of a place is worth that of two seconds: the rest would
   /// outvote what is seen when passing by.
@@ -107,6 +110,8 @@ class StaticMap {
   /// stay as they are.
   void begin_session(std::uint32_t max_scans = default_earlier_scans);
 
+  /// Whether scans clear at all, some of them.
+  [[nodiscard]] bool is_clearing() const;
   /// Whether visibility clearing is due for the scan inserted last.
   [[nodiscard]] bool clearing_due() const;
   /// Visibility clearing: counts a miss for each voxel that this scan saw through, and for each

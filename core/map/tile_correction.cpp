@@ -195,8 +195,9 @@ void TileCorrection::merge(const LiveTile& tile, LiveTile::LiveVoxel& known,
   };
   if (earlier(added.first_scan, known.first_scan)) known.first_scan = added.first_scan;
   if (earlier(known.last_scan, added.last_scan)) known.last_scan = added.last_scan;
-  known.misses = std::min<std::uint16_t>(known.misses, added.misses) & 0x3FFFU;
+  known.misses = std::min<std::uint16_t>(known.misses, added.misses) & 0x1FFFU;
   known.hits = capped_sum(known.hits, added.hits);
+  known.is_thin |= added.is_thin;
   known.was_shown |= added.was_shown;
   known.is_restored |= added.is_restored;
 }

@@ -20,7 +20,7 @@ void LiveTile::add_misses(LiveVoxel& voxel, std::uint32_t misses) {
     voxel.misses = max_misses / 2;
     voxel.hits /= 2;
   }
-  voxel.misses = static_cast<std::uint16_t>(voxel.misses + misses) & 0x3FFFU;
+  voxel.misses = static_cast<std::uint16_t>(voxel.misses + misses) & 0x1FFFU;
 }
 
 void LiveTile::forget_beyond(LiveVoxel& voxel, std::uint32_t max_scans,
@@ -40,17 +40,19 @@ void LiveTile::forget_beyond(LiveVoxel& voxel, std::uint32_t max_scans,
   };
   voxel.hits =
       static_cast<std::uint16_t>(std::max(shortened(voxel.hits), voxel.hits > 0 ? 1U : 0U));
-  voxel.misses = shortened(voxel.misses) & 0x3FFFU;
+  voxel.misses = shortened(voxel.misses) & 0x1FFFU;
   // Rounding must not show or hide it.
   while (was_seen_through && !is_seen_through(voxel, rule) && voxel.misses < max_misses)
-    voxel.misses = (voxel.misses + 1U) & 0x3FFFU;
+    voxel.misses = (voxel.misses + 1U) & 0x1FFFU;
   while (!was_seen_through && is_seen_through(voxel, rule))
-    voxel.misses = (voxel.misses - 1U) & 0x3FFFU;
+    voxel.misses = (voxel.misses - 1U) & 0x1FFFU;
 }
 
-bool LiveTile::is_surely_thin(const LiveVoxel& voxel) {
+Thin LiveTile::thin(const LiveVoxel& voxel) {
   const ClassEvidence& evidence = voxel.packed.evidence;
-  return is_thin(evidence.winner()) && evidence.is_sure(voxel.packed.point_count);
+  if (is_thin(evidence.winner()) && evidence.is_sure(voxel.packed.point_count))
+    return Thin::by_labels;
+  return voxel.is_thin != 0 ? Thin::by_beam : Thin::no;
 }
 
 std::uint32_t LiveTile::misses_to_clear(const LiveVoxel& voxel, const VisibilityRule& rule) {

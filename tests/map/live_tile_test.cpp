@@ -39,7 +39,7 @@ std::vector<TilePoint> scan_of(std::uint32_t seed) {
   return points;
 }
 
-bool every_fourth_is_free(const Eigen::Vector3f& position_map, bool) {
+bool every_fourth_is_free(const Eigen::Vector3f& position_map, Thin) {
   return static_cast<int>(std::floor(position_map.x() * 5.0F)) % 4 == 0;
 }
 
@@ -47,7 +47,7 @@ bool every_fourth_is_free(const Eigen::Vector3f& position_map, bool) {
 VisibilityTest visibility_after(std::uint32_t last_scan_cleared) {
   return {.is_free = every_fourth_is_free,
           .times_free_before =
-              [](const Eigen::Vector3f& position_map, bool) {
+              [](const Eigen::Vector3f& position_map, Thin) {
                 return static_cast<std::uint32_t>(std::floor(position_map.y() * -5.0F)) % 3;
               },
           .last_scan_cleared = last_scan_cleared};
@@ -122,9 +122,9 @@ TEST(LiveTile, CountsTheMissesOfLaterScansAndOfThoseKeptBefore) {
     }
     tile.insert(points, stamps.add(scan));
     const VisibilityTest test{
-        .is_free = [&](const Eigen::Vector3f& p_map, bool) { return is_free_in(scan, p_map); },
+        .is_free = [&](const Eigen::Vector3f& p_map, Thin) { return is_free_in(scan, p_map); },
         .times_free_before =
-            [&](const Eigen::Vector3f& p_map, bool) {
+            [&](const Eigen::Vector3f& p_map, Thin) {
               std::uint32_t times = 0;
               for (std::uint32_t age = 1; age <= std::min(scan, kept_scans); ++age)
                 times += is_free_in(scan - age, p_map) ? 1 : 0;
@@ -158,7 +158,7 @@ TEST(LiveTile, OnlyASureClassTakesMoreMissesToClear) {
     TilePoint point = point_in(voxel_key({7, 8, 1}), label);
     point.confidence = confidence;
     for (int i = 0; i < hits; ++i) tile.insert(std::array{point}, stamps.add(i));
-    const VisibilityTest test{.is_free = [](const Eigen::Vector3f&, bool) { return true; },
+    const VisibilityTest test{.is_free = [](const Eigen::Vector3f&, Thin) { return true; },
                               .times_free_before = {},
                               .last_scan_cleared = 0};
     for (std::uint32_t miss = 0; miss < misses; ++miss)

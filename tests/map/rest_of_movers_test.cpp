@@ -34,7 +34,7 @@ class RestOfMovers : public testing::Test {
     tile_->insert(points, number);
     const VisibilityTest test{
         .is_free = [&](const Eigen::Vector3f& p_map,
-                       bool) { return free_columns.contains(static_cast<int>(p_map.x() / 0.2F)); },
+                       Thin) { return free_columns.contains(static_cast<int>(p_map.x() / 0.2F)); },
         .times_free_before = {},
         .last_scan_cleared = number,
         .stamps = &stamps_};

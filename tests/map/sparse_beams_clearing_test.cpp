@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <set>
+#include <utility>
+#include <vector>
 
 #include "core/lidar/range_image_view.hpp"
 #include "core/map/static_map.hpp"
@@ -25,8 +28,10 @@ struct SparseWorld {
   std::optional<double> vehicle_at_m = {};
   /// Bars of a fence every three degrees, 10 m about the lidar, turned by this [degrees].
   std::optional<double> fence_turned_by = {};
-  /// A rail of 8 cm across the way, 1 m above the ground, that labels are sure of.
+  /// A rail of 8 cm across the way, 1 m above the ground.
   std::optional<double> rail_at_m = {};
+  /// What labels are sure that the rail is.
+  SemanticClass rail_label = SemanticClass::fence;
 
   [[nodiscard]] std::optional<double> rail_range_m(const Vector3d& origin,
                                                    const Vector3d& direction) const {
@@ -74,15 +79,17 @@ class SparseBeamsClearing : public testing::Test {
           const double range_m = world.range_m(T_map_lidar.translation(), direction, azimuth);
           if (range_m > 120.0) continue;
           if (const auto rail_m = world.rail_range_m(T_map_lidar.translation(), direction)) {
-            add_point(scan, (*rail_m * direction).cast<float>(), SemanticClass::fence);
+            add_point(scan, (*rail_m * direction).cast<float>(), world.rail_label);
             continue;
           }
           add_point(scan, (range_m * direction).cast<float>(), SemanticClass::unlabeled);
         }
       }
-      map_.insert(scan, T_map_lidar);
+      std::vector<std::uint8_t> is_thin;
+      RangeImageView view(scan.scan, vlp_16(), T_map_lidar, is_thin);
+      map_.insert(scan, T_map_lidar, is_thin);
       if (++inserted_ % clearing_interval_ != 0) continue;
-      map_.clear_seen_through(RangeImageView(scan.scan, {}, vlp_16(), T_map_lidar), stamp_ns_);
+      map_.clear_seen_through(std::move(view), stamp_ns_);
     }
   }
   [[nodiscard]] std::vector<RemovedVoxel> removed() const {
@@ -95,6 +102,19 @@ class SparseBeamsClearing : public testing::Test {
         return voxel.mean_map.z() + lidar_height_m > height_m;
       }));
     return count;
+  }
+
+  /// Columns of voxels 0.2 m wide within 2 m to the sides in which the rail is shown.
+  [[nodiscard]] std::size_t columns_of_rail_at(double at_m) {
+    std::set<long> columns;
+    for (const auto& tile : map_.view()->tiles)
+      for (const Voxel& voxel : tile->voxels) {
+        const Vector3d mean = voxel.mean_map.cast<double>();
+        if (std::abs(mean.x() - at_m) < 0.2 && std::abs(mean.y()) < 2.0 &&
+            std::abs(mean.z() + lidar_height_m - 1.0) < 0.1)
+          columns.insert(std::lround(std::floor(mean.y() / 0.2)));
+      }
+    return columns.size();
   }
 
   [[nodiscard]] int shown(SemanticClass label) {
@@ -142,6 +162,25 @@ TEST_F(SparseBeamsClearing, ARailBetweenBeamsMostOfTheTimeStays) {
   // Once it is gone, rays go through its place, too.
   for (int step = 0; step < 120; ++step) see({}, 0.1 * (step % 90));
   EXPECT_LT(shown(SemanticClass::fence), 5);
+}
+
+TEST_F(SparseBeamsClearing, ARailThatTheLidarDrivesTowardsStaysWithoutLabels) {
+  constexpr SemanticClass none = SemanticClass::unlabeled;
+  clearing_interval_ = 3;
+  for (int step = 0; step < 20; ++step) see({.rail_at_m = 20.0, .rail_label = none}, 0.8 * step);
+  EXPECT_GE(columns_of_rail_at(20.0), 18U);
+  // Once it is gone, rays go through its place, too.
+  for (int step = 0; step < 180; ++step) see({}, 0.1 * step);
+  EXPECT_LE(columns_of_rail_at(20.0), 2U);
+}
+
+TEST_F(SparseBeamsClearing, AVehicleThatOneBeamAloneHitIsNoRail) {
+  // The beam at -1 degree hits it 1.3 m above the ground; that at -3 passes through below it.
+  see({.vehicle_at_m = 33.0}, 0.0, 2);
+  ASSERT_GT(shown_above(0.6), 5);
+  // From here its place is between these beams.
+  see({}, 9.0);
+  EXPECT_EQ(shown_above(0.6), 0);
 }
 
 }  // namespace
