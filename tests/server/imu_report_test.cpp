@@ -32,7 +32,8 @@ void turn(InertialTracker& tracker, ImuReport& report, double unit, std::int64_t
     const std::int64_t now_ns = scan * 100 * per_ms;
     for (; sampled_ms < 100 * scan + 200; sampled_ms += 5) {
       const double noise = 1e-4 * static_cast<double>(sampled_ms % 3);
-      tracker.add({(sampled_ms - late_ms) * per_ms, {noise, 0.0, 0.3 * unit}, {0.0, 0.0, 9.81}});
+      tracker.add(
+          {(sampled_ms - late_ms) * per_ms, {noise, noise, 0.3 * unit + noise}, {0.0, 0.0, 9.81}});
     }
     (void)tracker.motion(now_ns - 100 * per_ms, now_ns, sweep);
     tracker.learn(now_ns - 100 * per_ms, now_ns, step);
