@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/frames/rigid_motion.hpp"
+#include "core/odometry/rigid_registration.hpp"
 
 namespace stillmap {
 namespace {
@@ -16,23 +17,6 @@ constexpr double floor_translation_m = 0.02;
 constexpr double floor_rotation_rad = 0.0007;
 /// Neighbouring residuals err alike: its covariance is that of so many times fewer.
 constexpr double residuals_per_independent_one = 40.0;
-
-OdometryConfig fine_config() {
-  OdometryConfig config;
-  config.weighting = Weighting::geometric;
-  config.registration.sweep_translation_m = 0.0;
-  config.registration.max_iterations = 30;
-  return config;
-}
-
-OdometryConfig wide_config() {
-  OdometryConfig config = fine_config();
-  config.weighting = Weighting::none;
-  config.registration.robust_scale_m = 0.4;
-  config.registration.step_translation_m = 0.005;
-  config.registration.step_rotation_rad = 0.0005;
-  return config;
-}
 
 LocalMapConfig target_map_config() {
   LocalMapConfig config;
@@ -66,9 +50,9 @@ OdometryResult SubmapTarget::register_submap(const Submap& source,
                                              const Eigen::Isometry3d& T_target_source_guess) const {
   const FeatureSets features = surfaces_of(source);
   const OdometryResult wide =
-      register_features(features, map_, T_target_source_guess, wide_config());
+      register_features(features, map_, T_target_source_guess, wide_rigid_registration());
   if (wide.health == OdometryHealth::lost) return wide;
-  return register_features(features, map_, wide.T_map_lidar, fine_config());
+  return register_features(features, map_, wide.T_map_lidar, rigid_registration());
 }
 
 Matrix6d edge_information(const OdometryResult& registration) {

@@ -6,6 +6,7 @@
 
 #include "core/odometry/faint_shifts.hpp"
 #include "core/odometry/point_alignment.hpp"
+#include "core/odometry/rigid_registration.hpp"
 
 namespace stillmap {
 namespace {
@@ -36,24 +37,6 @@ LocalMapConfig map_config() {
 constexpr double max_way_m = 1.5;
 constexpr double max_way_rad = 0.1;
 
-OdometryConfig surface_config() {
-  OdometryConfig config;
-  config.weighting = Weighting::geometric;
-  config.registration.sweep_translation_m = 0.0;
-  config.registration.max_iterations = 30;
-  return config;
-}
-
-/// What shows the way along a smooth street is little, and farther off than the kernel at first.
-OdometryConfig wide_surface_config() {
-  OdometryConfig config = surface_config();
-  config.weighting = Weighting::none;
-  config.registration.robust_scale_m = 0.4;
-  config.registration.step_translation_m = 0.005;
-  config.registration.step_rotation_rad = 0.0005;
-  return config;
-}
-
 double share(int part, int whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
 }
@@ -83,9 +66,9 @@ Eigen::Isometry3d MapSurroundings::align(const LocalizationQuery& query,
 
 std::optional<SurfacePose> MapSurroundings::align_surfaces(
     const LocalizationQuery& query, const Eigen::Isometry3d& T_map_upright) const {
-  const OdometryConfig config = surface_config();
+  const OdometryConfig config = rigid_registration();
   const OdometryResult wide =
-      register_features(query.features_upright, map_, T_map_upright, wide_surface_config());
+      register_features(query.features_upright, map_, T_map_upright, wide_rigid_registration());
   if (wide.health == OdometryHealth::lost) return std::nullopt;
   const OdometryResult found =
       register_features(query.features_upright, map_, wide.T_map_lidar, config);
