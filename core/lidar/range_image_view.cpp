@@ -18,6 +18,7 @@ constexpr int max_columns = 1024;
 /// So many points are projected at once, in vector registers.
 constexpr Eigen::Index batch_size = 256;
 using Batch = Eigen::Array<float, batch_size, 1>;
+using WholeBatch = Eigen::Array<int, batch_size, 1>;
 
 constexpr float pi = std::numbers::pi_v<float>;
 
@@ -100,32 +101,59 @@ RangeImageView::RangeImageView(const Scan& scan, std::span<const SemanticClass> 
         return rows;
       },
       wider);
-  for (std::size_t i = 0; i < returns.size(); ++i) {
-    const auto [pixel, row, range_m] = returns[i];
-    if (pixel == none) continue;
-    // Without branches: which of two returns comes first is anybody's guess.
-    const float old = pixels_[pixel];
-    const bool is_nearer = old == 0.0F || range_m < std::abs(old);
-    const float signed_range = !labels.empty() && is_movable(labels[i]) ? range_m : -range_m;
-    pixels_[pixel] = is_nearer ? signed_range : old;
-    const auto row_top = static_cast<float>(pixel / static_cast<std::uint32_t>(columns_));
-    below_row_top_[pixel] = is_nearer ? share_of_row(row, row_top) : below_row_top_[pixel];
-  }
+  fill(returns, labels);
   if (is_thin != nullptr) *is_thin = thin_ones(returns);
 }
 
+void RangeImageView::fill(std::span<const Return> returns, std::span<const SemanticClass> labels) {
+  float* const pixels = pixels_.data();
+  std::uint8_t* const below_row_top = below_row_top_.data();
+  for (std::size_t i = 0; i < returns.size(); ++i) {
+    const Return& found = returns[i];
+    if (found.pixel == none) continue;
+    // Without branches: which of two returns comes first is anybody's guess.
+    const float old = pixels[found.pixel];
+    const std::uint8_t old_below = below_row_top[found.pixel];
+    const bool is_nearer = (old == 0.0F) | (found.range_m < std::abs(old));
+    const bool may_move = !labels.empty() && is_movable(labels[i]);
+    const float signed_range = may_move ? found.range_m : -found.range_m;
+    pixels[found.pixel] = is_nearer ? signed_range : old;
+    below_row_top[found.pixel] = is_nearer ? found.below_row_top : old_below;
+  }
+}
+
 std::vector<std::uint8_t> RangeImageView::thin_ones(std::span<const Return> returns) const {
-  // Of the outermost beams nothing is known above or below.
   std::vector<std::uint8_t> is_thin_at(pixels_.size());
-  for (int row = 1; row + 1 < rows_; ++row)
+  std::vector<std::uint8_t> may_be_thin(static_cast<std::size_t>(columns_));
+  // Of the outermost beams nothing is known above or below.
+  for (int row = 1; row + 1 < rows_; ++row) {
+    mark_alone_in_column(row, may_be_thin);
     for (int column = 0; column < columns_; ++column)
-      is_thin_at[index(row, column)] = is_thin(row, column) ? 1 : 0;
+      if (may_be_thin[static_cast<std::size_t>(column)] != 0)
+        is_thin_at[index(row, column)] = is_thin(row, column) ? 1 : 0;
+  }
   std::vector<std::uint8_t> thin(returns.size());
   std::ranges::transform(returns, thin.begin(), [&](const Return& point) -> std::uint8_t {
     if (point.pixel == none || is_thin_at[point.pixel] == 0) return 0;
     return point.range_m <= std::abs(pixels_[point.pixel]) + max_depth_m ? 1 : 0;
   });
   return thin;
+}
+
+void RangeImageView::mark_alone_in_column(int row, std::span<std::uint8_t> alone) const {
+  const float* const above = &pixels_[index(row - 1, 0)];
+  const float* const own = &pixels_[index(row, 0)];
+  const float* const below = &pixels_[index(row + 1, 0)];
+  for (std::size_t column = 0; column < alone.size(); ++column) {
+    const float range_m = std::abs(own[column]);
+    const float above_m = std::abs(above[column]);
+    const float below_m = std::abs(below[column]);
+    const float behind_m = range_m + min_gap_m;
+    // Beams that are not evenly spaced leave a row empty here and there: is_thin() looks on.
+    const bool goes_on_above = (above_m > 0.0F) & (above_m <= behind_m);
+    const bool goes_on_below = (below_m > 0.0F) & (below_m <= behind_m);
+    alone[column] = (range_m > 0.0F) & !goes_on_above & !goes_on_below ? 1 : 0;
+  }
 }
 
 void RangeImageView::move_to(const Eigen::Isometry3d& T_map_lidar) {
@@ -146,13 +174,23 @@ RangeImageView::RowRange RangeImageView::project(std::span<const Eigen::Vector3f
   const Batch range_m = (across.square() + z.square()).sqrt();
   const Batch row = (fov_up_ - fast_atan2(z, across)) * rows_per_rad_;
   const Batch column = 0.5F * (1.0F - fast_atan2(y, x) / pi) * static_cast<float>(columns_);
+  const auto whole = [](const Batch& share, int end) -> WholeBatch {
+    return share.max(0.0F).min(static_cast<float>(end - 1)).cast<int>();
+  };
+  const WholeBatch r = whole(row, rows_);
+  const WholeBatch pixel = r * columns_ + whole(column, columns_);
+  const WholeBatch below_row_top =
+      (256.0F * (row - r.cast<float>())).max(0.0F).min(255.0F).cast<int>();
+  // Half a row of slack: the outermost beams look along the edge of the field of view.
+  const float last_row = static_cast<float>(rows_) + 0.5F;
   RowRange rows;
   for (std::size_t i = 0; i < points_lidar.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    returns[i] = {pixel_at(row[k], column[k], range_m[k]), row[k], range_m[k]};
-    if (returns[i].pixel == none) continue;
-    rows.first = std::min(rows.first, row[k]);
-    rows.last = std::max(rows.last, row[k]);
+    const bool is_seen = (range_m[k] > 0.0F) & (row[k] >= -0.5F) & (row[k] < last_row);
+    returns[i] = {is_seen ? static_cast<std::uint32_t>(pixel[k]) : none, range_m[k],
+                  static_cast<std::uint8_t>(below_row_top[k])};
+    rows.first = is_seen ? std::min(rows.first, row[k]) : rows.first;
+    rows.last = is_seen ? std::max(rows.last, row[k]) : rows.last;
   }
   return rows;
 }

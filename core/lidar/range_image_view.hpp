@@ -60,12 +60,11 @@ class RangeImageView {
 
  private:
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-  /// Pixel and range of a measured point.
+  /// Where a point was measured: its pixel, or `none` outside the field of view or without a range.
   struct Return {
     std::uint32_t pixel = 0;
-    /// As a fraction of rows from the top.
-    float row = 0.0F;
     float range_m = 0.0F;
+    std::uint8_t below_row_top = 0;
   };
   /// The nearest return up or down from a pixel.
   struct Beside {
@@ -80,14 +79,8 @@ class RangeImageView {
                  const Eigen::Isometry3d& T_map_lidar, std::vector<std::uint8_t>* is_thin);
   /// Returns the rows between which the points lie.
   RowRange project(std::span<const Eigen::Vector3f> points_lidar, std::span<Return> returns) const;
-  /// `none` outside the field of view, or without a range.
-  [[nodiscard]] std::uint32_t pixel_at(float row, float column, float range_m) const {
-    // Half a row of slack: the outermost beams look along the edge of the field of view.
-    const bool is_seen = range_m > 0.0F && row >= -0.5F && row < static_cast<float>(rows_) + 0.5F;
-    const int r = std::clamp(static_cast<int>(is_seen ? row : 0.0F), 0, rows_ - 1);
-    const int c = std::clamp(static_cast<int>(is_seen ? column : 0.0F), 0, columns_ - 1);
-    return is_seen ? static_cast<std::uint32_t>(r * columns_ + c) : none;
-  }
+  /// Of each pixel the nearest return.
+  void fill(std::span<const Return> returns, std::span<const SemanticClass> labels);
   [[nodiscard]] std::optional<Direction> direction_of(const Eigen::Vector3f& point_lidar,
                                                       float range_m) const;
   [[nodiscard]] std::size_t index(int row, int column) const {
@@ -101,6 +94,9 @@ class RangeImageView {
   /// Which of the scan's points one beam alone hit (see the constructor).
   [[nodiscard]] std::vector<std::uint8_t> thin_ones(std::span<const Return> returns) const;
   [[nodiscard]] bool is_thin(int row, int column) const;
+  /// Of the pixels of a row between two others: 1 where is_thin() may hold, since no surface goes
+  /// on in the rows right above and below, 0 where one does, or where nothing was measured.
+  void mark_alone_in_column(int row, std::span<std::uint8_t> alone) const;
   /// Whether the beams above and below a point see past a range in a column.
   [[nodiscard]] bool column_sees_past(const Direction& at, int column, float range_m) const;
 

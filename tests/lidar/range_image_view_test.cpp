@@ -1,0 +1,146 @@
+#include "core/lidar/range_image_view.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <random>
+#include <utility>
+#include <vector>
+
+namespace stillmap {
+namespace {
+
+constexpr int rings = 32;
+constexpr int columns = 360;
+constexpr double step_deg = 360.0 / columns;
+
+SensorModel one_degree_lidar() {
+  SensorModel sensor;
+  sensor.rings = rings;
+  sensor.columns = columns;
+  sensor.fov_up = 5.0 * std::numbers::pi / 180.0;
+  sensor.fov_down = (5.0 - rings) * std::numbers::pi / 180.0;
+  return sensor;
+}
+
+/// In a pixel's middle share, so that rounding moves no point into the next one.
+Eigen::Vector3f point_in(int row, int column, double share, double range_m) {
+  const double elevation = (5.0 - row - share) * std::numbers::pi / 180.0;
+  const double azimuth = std::numbers::pi * (1.0 - (column + share) * step_deg / 180.0);
+  return (range_m * Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
+                                    std::cos(elevation) * std::sin(azimuth), std::sin(elevation)))
+      .cast<float>();
+}
+
+using Pixels = std::map<std::pair<int, int>, double>;
+
+/// The nearest return of the next row that has one, or the next but one, in columns from `first` to
+/// `last`; 1000 m without one.
+double beside_m(const Pixels& pixels, int row, int column, int step, int reach) {
+  double nearest_m = 1000.0;
+  for (int c = column - reach; c <= column + reach; ++c) {
+    for (const int r : {row + step, row + 2 * step}) {
+      const auto pixel = pixels.find({r, (c + columns) % columns});
+      if (pixel == pixels.end()) continue;
+      nearest_m = std::min(nearest_m, pixel->second);
+      break;
+    }
+  }
+  return nearest_m;
+}
+
+/// A few thousand points, several in many pixels and none in others, the outermost rows included.
+struct ScatteredPoints {
+  Scan scan;
+  std::vector<std::pair<int, int>> pixel_of;
+  Pixels nearest_m;
+
+  explicit ScatteredPoints(unsigned seed) {
+    std::mt19937 random(seed);
+    std::uniform_int_distribution<int> row(0, rings - 1), column(0, columns - 1);
+    std::uniform_real_distribution<double> share(0.1, 0.9), range_m(2.0, 60.0);
+    // No multiple of what is projected at once.
+    for (int i = 0; i < 9001; ++i) {
+      const std::pair pixel(row(random), column(random));
+      const double r_m = range_m(random);
+      scan.points_lidar.push_back(point_in(pixel.first, pixel.second, share(random), r_m));
+      pixel_of.push_back(pixel);
+      const auto [nearest, is_new] = nearest_m.try_emplace(pixel, r_m);
+      if (!is_new) nearest->second = std::min(nearest->second, r_m);
+    }
+  }
+};
+
+/// Whether rounding may put the point beyond the outermost one.
+bool is_outermost(const std::pair<int, int>& pixel) {
+  return pixel.first == 0 || pixel.first == rings - 1;
+}
+
+TEST(RangeImageView, HasTheNearestReturnOfEachPixel) {
+  const ScatteredPoints points(1);
+  const RangeImageView view(points.scan, {}, one_degree_lidar(), Eigen::Isometry3d::Identity());
+  for (std::size_t i = 0; i < points.scan.size(); ++i) {
+    const auto seen = view.observe(points.scan.points_lidar[i]);
+    if (!seen && is_outermost(points.pixel_of[i])) continue;
+    ASSERT_TRUE(seen) << i;
+    EXPECT_EQ(std::pair(seen->at.row, seen->at.column), points.pixel_of[i]);
+    EXPECT_NEAR(seen->range_m, points.nearest_m.at(points.pixel_of[i]), 1e-4);
+    EXPECT_FALSE(seen->movable);
+  }
+}
+
+TEST(RangeImageView, TellsMovableReturnsApart) {
+  const ScatteredPoints points(2);
+  std::vector<SemanticClass> labels(points.scan.size(), SemanticClass::building);
+  for (std::size_t i = 0; i < labels.size(); i += 2) labels[i] = SemanticClass::car;
+  const RangeImageView view(points.scan, labels, one_degree_lidar(), Eigen::Isometry3d::Identity());
+  for (std::size_t i = 0; i < points.scan.size(); ++i) {
+    const auto seen = view.observe(points.scan.points_lidar[i]);
+    if (!seen && is_outermost(points.pixel_of[i])) continue;
+    ASSERT_TRUE(seen) << i;
+    if (std::abs(seen->range_m - seen->point_range_m) > 1e-4F) continue;
+    EXPECT_EQ(seen->movable, i % 2 == 0) << i;
+  }
+}
+
+TEST(RangeImageView, LeavesOutWhatIsAboveTheBeamsOrHasNoRange) {
+  ScatteredPoints points(3);
+  points.scan.points_lidar = {Eigen::Vector3f::Zero(), {1.0F, 0.0F, 5.0F}, {1.0F, 0.0F, -5.0F}};
+  std::vector<std::uint8_t> is_thin;
+  const RangeImageView view(points.scan, one_degree_lidar(), Eigen::Isometry3d::Identity(),
+                            is_thin);
+  for (const Eigen::Vector3f& point : points.scan.points_lidar) EXPECT_FALSE(view.observe(point));
+  EXPECT_EQ(is_thin, std::vector<std::uint8_t>(3, 0));
+}
+
+TEST(RangeImageView, FindsWhatIsThinAsALookAtEveryPixelDoes) {
+  int thin = 0;
+  for (const unsigned seed : {4U, 5U, 6U}) {
+    const ScatteredPoints points(seed);
+    std::vector<std::uint8_t> is_thin;
+    const RangeImageView view(points.scan, one_degree_lidar(), Eigen::Isometry3d::Identity(),
+                              is_thin);
+    for (std::size_t i = 0; i < points.scan.size(); ++i) {
+      const auto [row, column] = points.pixel_of[i];
+      const double range_m = points.nearest_m.at(points.pixel_of[i]);
+      const double point_m = points.scan.points_lidar[i].norm();
+      // Where the beam below comes down by enough is not looked at: all of these do.
+      const double above_m = beside_m(points.nearest_m, row, column, -1, 1);
+      const double below_m = beside_m(points.nearest_m, row, column, 1, 1);
+      if (row < 12 || std::abs(above_m - range_m - 0.5) < 1e-3 ||
+          std::abs(below_m - range_m - 0.5) < 1e-3 || std::abs(point_m - range_m - 0.3) < 1e-3)
+        continue;
+      if (below_m - range_m < 3.0 && below_m - range_m > 0.5) continue;
+      const bool is_alone = above_m > range_m + 0.5 && below_m > range_m + 0.5 && below_m < 1000.0;
+      const bool expected = row + 1 < rings && is_alone && point_m <= range_m + 0.3;
+      EXPECT_EQ(is_thin[i] != 0, expected) << row << ", " << column;
+      thin += expected ? 1 : 0;
+    }
+  }
+  EXPECT_GT(thin, 200);
+}
+
+}  // namespace
+}  // namespace stillmap
