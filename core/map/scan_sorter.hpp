@@ -35,17 +35,20 @@ class ScanSorter {
     std::int32_t side = 0;
   };
 
-  /// The pose in voxels, a vector register a column: place = x p.x + y p.y + z p.z + origin.
+  /// The pose in voxels: place = x p.x + y p.y + z p.z + origin.
   struct PoseInVoxels {
     PoseInVoxels(const Eigen::Isometry3d& T_map_lidar, double voxel_size_m);
 
-    Eigen::Array4d x, y, z, origin;
+    Eigen::Array3d x, y, z, origin;
   };
+
+  struct LanesPlaced;
 
   void index_points(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
                     const Window& window);
-  void index_point(std::size_t i, const LabelledScan& scan, const PoseInVoxels& pose,
-                   const Window& window);
+  /// Of the points from `first` on, of which there are so many at most as are placed at once.
+  void index_some(std::size_t first, std::size_t count, const LabelledScan& scan,
+                  const PoseInVoxels& pose, const Window& window);
   void group_by_tile(const Window& window);
 
   VoxelGrid grid_;

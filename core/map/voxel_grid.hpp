@@ -47,9 +47,9 @@ class VoxelGrid {
 
   /// Whether the position has a voxel: finite, and not too far from the origin.
   [[nodiscard]] bool holds(const Eigen::Vector3d& p_map) const {
-    // Written so that NaN fails every comparison.
-    return std::abs(p_map.x()) <= max_coordinate_m && std::abs(p_map.y()) <= max_coordinate_m &&
-           std::abs(p_map.z()) <= max_z_m_;
+    // Written so that NaN fails every comparison, and without branches.
+    return (std::abs(p_map.x()) <= max_coordinate_m) & (std::abs(p_map.y()) <= max_coordinate_m) &
+           (std::abs(p_map.z()) <= max_z_m_);
   }
 
   /// Requires holds(p_map).
