@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
@@ -66,17 +67,31 @@ class RayDensity {
 class NearCubes {
  public:
   explicit NearCubes(std::span<const Eigen::Vector3f> points)
-      : counts_(std::size_t{shells} * shell_size), places_(points.size()) {
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      places_[i] = place_of(points[i]);
-      if (places_[i] != outside) ++counts_[places_[i]];
+      : counts_(std::size_t{outside} + 1), places_(points.size()) {
+    for (std::size_t i = 0; i < points.size(); i += lanes) {
+      const std::size_t count = std::min(lanes, points.size() - i);
+      place_some(points.subspan(i, count), std::span(places_).subspan(i, count));
     }
+    for (const std::uint32_t place : places_) ++counts_[place];
   }
-  /// Whether less than the share that is solid of the rays through the cube of the i-th point end
-  /// there, and it is on no level surface.
+  /// Marks the cubes in which few rays end even of those that pass at the cube's inner side: of all
+  /// others is_in_air() holds for no point. Returns how many points the marked ones have.
+  std::size_t mark_thin(const RayDensity& rays) {
+    is_thin_.assign(counts_.size(), 0);
+    std::size_t count = 0;
+    for (std::uint32_t place = 0; place < outside; ++place) {
+      if (counts_[place] == 0 || is_surely_solid(place, rays)) continue;
+      is_thin_[place] = 1;
+      count += counts_[place];
+    }
+    return count;
+  }
+  /// Whether the i-th point is in a marked cube.
+  [[nodiscard]] bool may_be_in_air(std::size_t i) const { return is_thin_[places_[i]] != 0; }
+  /// Whether less than the share that is solid of the rays through the cube of the i-th point,
+  /// which may be in the air, end there, and it is on no level surface.
   [[nodiscard]] bool is_in_air(std::size_t i, const Eigen::Vector3f& point,
                                const RayDensity& rays) const {
-    if (places_[i] == outside) return false;
     const std::uint32_t shell = places_[i] / shell_size;
     const float cube_m = cube_of_shell_m(shell);
     const float squared_cube_m2 = cube_m * cube_m;
@@ -92,24 +107,61 @@ class NearCubes {
  private:
   static constexpr std::uint32_t side = 2 * reach_cubes;
   static constexpr std::uint32_t shell_size = side * side * side;
-  static constexpr std::uint32_t outside = ~std::uint32_t{0};
+  static constexpr std::uint32_t outside = shells * shell_size;
 
-  [[nodiscard]] static std::uint32_t place_of(const Eigen::Vector3f& point) {
-    const float reach_m = point.cwiseAbs().maxCoeff();
-    for (std::uint32_t shell = 0; shell < shells; ++shell) {
-      const float cube_m = cube_of_shell_m(shell);
-      const float shell_reach_m = cube_m * static_cast<float>(reach_cubes);
-      if (!(reach_m < shell_reach_m)) continue;
-      const auto along = [&](float coordinate_m) {
-        return std::min(static_cast<std::uint32_t>((coordinate_m + shell_reach_m) / cube_m),
-                        side - 1);
-      };
-      return shell * shell_size + (along(point.z()) * side + along(point.y())) * side +
-             along(point.x());
+  /// So many points are placed at once, in vector registers.
+  static constexpr std::size_t lanes = 64;
+
+  static void place_some(std::span<const Eigen::Vector3f> points, std::span<std::uint32_t> places) {
+    std::array<float, lanes> x{}, y{}, z{};
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      x[k] = points[k].x();
+      y[k] = points[k].y();
+      z[k] = points[k].z();
     }
-    return outside;
+    std::array<std::uint32_t, lanes> place;
+    for (std::size_t k = 0; k < lanes; ++k) place[k] = place_of(x[k], y[k], z[k]);
+    std::copy_n(place.begin(), places.size(), places.begin());
+  }
+  /// Without branches, so that it is done for many at once.
+  [[nodiscard]] static std::uint32_t place_of(float x, float y, float z) {
+    static_assert(shells == 3);
+    const float reach_m = std::max(std::max(std::abs(x), std::abs(y)), std::abs(z));
+    const std::uint32_t shell =
+        (reach_m < reach_of_shell_m(0) ? 0U : 1U) + (reach_m < reach_of_shell_m(1) ? 0U : 1U);
+    const float cube_m = shell == 0   ? cube_of_shell_m(0)
+                         : shell == 1 ? cube_of_shell_m(1)
+                                      : cube_of_shell_m(2);
+    const float shell_reach_m = cube_m * static_cast<float>(reach_cubes);
+    const auto along = [&](float coordinate_m) {
+      const float cubes = (coordinate_m + shell_reach_m) / cube_m;
+      return static_cast<std::uint32_t>(
+          static_cast<int>(std::min(std::max(0.0F, cubes), static_cast<float>(side - 1))));
+    };
+    const std::uint32_t place = shell * shell_size + (along(z) * side + along(y)) * side + along(x);
+    return reach_m < reach_of_shell_m(2) ? place : outside;
   }
 
+  [[nodiscard]] static constexpr float reach_of_shell_m(std::uint32_t shell) {
+    return cube_of_shell_m(shell) * static_cast<float>(reach_cubes);
+  }
+
+  /// Whether is_in_air() holds for no point of a cube, with some room for rounding.
+  [[nodiscard]] bool is_surely_solid(std::uint32_t place, const RayDensity& rays) const {
+    constexpr float room = 1.01F;
+    const std::uint32_t shell = place / shell_size;
+    // From the lidar to the cube, in cubes.
+    const auto squared_cubes = [](std::uint32_t k) {
+      const std::uint32_t cubes = k < reach_cubes ? reach_cubes - 1 - k : k - reach_cubes;
+      return cubes * cubes;
+    };
+    const auto squared =
+        static_cast<float>(squared_cubes(place % side) + squared_cubes(place / side % side) +
+                           squared_cubes(place / (side * side) % side));
+    const float max_share = max_share_in_air / static_cast<float>(1U << shell);
+    return static_cast<float>(counts_[place]) * std::max(squared, 1.0F) >=
+           room * max_share * rays.most_per_steradian();
+  }
   /// Whether `max_count` points and more lie in a cube and the one above or below it, on average of
   /// those beside it, and hardly any above or below these two: a level surface, which rays may meet
   /// at a flat angle, where cubes meet, or in but a corner of a cube. Rain goes on.
@@ -145,21 +197,24 @@ class NearCubes {
 
   std::vector<std::uint32_t> counts_;
   std::vector<std::uint32_t> places_;
+  std::vector<std::uint8_t> is_thin_;
 };
 
 }  // namespace
 
 std::vector<bool> points_in_air(std::span<const Eigen::Vector3f> points_lidar) {
-  const NearCubes cubes(points_lidar);
+  NearCubes cubes(points_lidar);
   const RayDensity rays(points_lidar);
+  const double few = min_share_of_scan * static_cast<double>(points_lidar.size());
+  if (static_cast<double>(cubes.mark_thin(rays)) < few) return {};
   std::vector<bool> in_air(points_lidar.size());
   std::size_t count = 0;
   for (std::size_t i = 0; i < points_lidar.size(); ++i) {
-    in_air[i] = cubes.is_in_air(i, points_lidar[i], rays);
-    count += in_air[i] ? 1 : 0;
+    if (!cubes.may_be_in_air(i) || !cubes.is_in_air(i, points_lidar[i], rays)) continue;
+    in_air[i] = true;
+    ++count;
   }
-  if (static_cast<double>(count) < min_share_of_scan * static_cast<double>(points_lidar.size()))
-    in_air.clear();
+  if (static_cast<double>(count) < few) in_air.clear();
   return in_air;
 }
 

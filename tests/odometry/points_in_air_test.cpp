@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <numbers>
 #include <random>
 #include <vector>
@@ -74,6 +75,88 @@ TEST(PointsInAir, AreDropsAndNothingSolid) {
     }
     EXPECT_GT(found, 0.85 * drops) << share;
     EXPECT_LT(mistaken, 0.002 * solid) << share;
+  }
+}
+
+/// The rule in its plainest form: every point by the rays through its own cube.
+class PlainRule {
+ public:
+  explicit PlainRule(const std::vector<Eigen::Vector3f>& points) {
+    for (std::size_t i = 0; i < points.size(); i += 7) rays_[bin_of(points[i])] += 7.0F;
+    for (int bin = 0; bin < bins; ++bin) most_ = std::max(most_, rays_at(bin));
+    for (const Eigen::Vector3f& point : points) ++counts_[cube_of(point)];
+  }
+  [[nodiscard]] bool is_in_air(const Eigen::Vector3f& point) const {
+    const Cube cube = cube_of(point);
+    if (cube[0] < 0) return false;
+    const float cube_m = 0.3F * static_cast<float>(1 << cube[0]);
+    const float steradians = cube_m * cube_m / std::max(point.squaredNorm(), cube_m * cube_m);
+    const float share = 0.06F / static_cast<float>(1 << cube[0]);
+    const auto count = static_cast<float>(counts_.at(cube));
+    const float max_count = share * steradians * rays_at(bin_of(point));
+    return count < share * steradians * most_ && count < max_count &&
+           !is_level(cube, cube[3], max_count) && !is_level(cube, cube[3] - 1, max_count);
+  }
+
+ private:
+  /// Shell, x, y, z.
+  using Cube = std::array<int, 4>;
+  static constexpr int bins = 50;
+
+  static int bin_of(const Eigen::Vector3f& point) {
+    const float sine = point.z() / std::max(point.norm(), 1e-3F);
+    return std::min(static_cast<int>(std::max(sine + 1.0F, 0.0F) / 0.04F), bins - 1);
+  }
+  [[nodiscard]] float rays_at(int bin) const {
+    const int first = std::max(bin - 1, 0), last = std::min(bin + 1, bins - 1);
+    float count = 0.0F;
+    for (int k = first; k <= last; ++k) count += rays_.at(static_cast<std::size_t>(k));
+    return count /
+           (2.0F * std::numbers::pi_v<float> * 0.04F * static_cast<float>(last - first + 1));
+  }
+  static Cube cube_of(const Eigen::Vector3f& point) {
+    for (int shell = 0; shell < 3; ++shell) {
+      const float cube_m = 0.3F * static_cast<float>(1 << shell), reach_m = 10.0F * cube_m;
+      if (point.cwiseAbs().maxCoeff() >= reach_m) continue;
+      const auto along = [&](float m) {
+        return std::min(static_cast<int>((m + reach_m) / cube_m), 19);
+      };
+      return {shell, along(point.x()), along(point.y()), along(point.z())};
+    }
+    return {-1, 0, 0, 0};
+  }
+  [[nodiscard]] bool is_level(const Cube& cube, int low, float max_count) const {
+    const float count = mean(cube, low) + mean(cube, low + 1);
+    return count >= max_count &&
+           std::max(mean(cube, low - 1), mean(cube, low + 2)) < 0.125F * count;
+  }
+  [[nodiscard]] float mean(const Cube& cube, int z) const {
+    const auto is_inner = [](int k) { return k >= 5 && k < 15; };
+    float count = 0.0F, cubes = 0.0F;
+    for (int y = cube[2] - 1; y <= cube[2] + 1; ++y)
+      for (int x = cube[1] - 1; x <= cube[1] + 1; ++x) {
+        if (std::min({x, y, z}) < 0 || std::max({x, y, z}) > 19) continue;
+        if (cube[0] > 0 && is_inner(x) && is_inner(y) && is_inner(z)) continue;
+        const auto found = counts_.find({cube[0], x, y, z});
+        if (found != counts_.end()) count += static_cast<float>(found->second);
+        cubes += 1.0F;
+      }
+    return count / std::max(cubes, 1.0F);
+  }
+
+  std::array<float, bins> rays_{};
+  float most_ = 0.0F;
+  std::map<Cube, int> counts_;
+};
+
+TEST(PointsInAir, AreThoseOfThePlainRule) {
+  for (const double share : {0.03, 0.10, 0.20}) {
+    const std::vector<Eigen::Vector3f> points = Rain(share, 11).points_lidar;
+    const PlainRule rule(points);
+    const std::vector<bool> in_air = points_in_air(points);
+    ASSERT_EQ(in_air.size(), points.size());
+    for (std::size_t i = 0; i < points.size(); ++i)
+      EXPECT_EQ(in_air[i], rule.is_in_air(points[i])) << share << ": " << points[i].transpose();
   }
 }
 
