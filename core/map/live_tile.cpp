@@ -17,8 +17,6 @@ namespace {
 /// Misses of a voxel are counted up to here.
 /// So many hits halve the misses of a voxel: more than a vehicle that waits at a light brings.
 constexpr std::uint16_t hits_to_settle = 32;
-/// So many points are looked up before they are added: their voxels are on their way meanwhile.
-constexpr std::size_t block_size = 64;
 constexpr std::uint32_t max_count = std::numeric_limits<std::uint16_t>::max();
 
 /// The first format does not store hits: the maximum is assumed, so that the voxel is not cleared
@@ -97,7 +95,9 @@ class LiveTile::Selection {
   std::uint32_t last_scan_ = 0;
 };
 
-LiveTile::LiveVoxel* LiveTile::find(const TilePoint& point) {
+LiveTile::LiveVoxel* LiveTile::find(const TilePoint& point, std::uint32_t likely_position) {
+  if (likely_position != PositionIndex::none && key_at()(likely_position) == point.voxel_key)
+    return &at(likely_position);
   const std::uint32_t position = index_.find(point.voxel_key, key_at());
   if (position != PositionIndex::none) return &at(position);
   if (point.motion != Motion::stationary || size() >= PositionIndex::max_entries) return nullptr;
@@ -125,12 +125,11 @@ void LiveTile::begin_session(std::uint32_t max_scans, const VisibilityRule& rule
 void LiveTile::insert(std::span<const TilePoint> points, std::uint32_t scan) {
   for (std::size_t begin = 0; begin < points.size(); begin += block_size) {
     const auto block = points.subspan(begin, std::min(block_size, points.size() - begin));
-    prefetch_voxels(block);
-    insert_block(block, scan);
+    insert_block(block, prefetch_voxels(block), scan);
   }
 }
 
-void LiveTile::prefetch_voxels(std::span<const TilePoint> points) const {
+LiveTile::LikelyPositions LiveTile::prefetch_voxels(std::span<const TilePoint> points) const {
   // Neighbours on a beam mostly share a voxel: asked for once.
   std::array<std::uint32_t, block_size> keys;
   std::size_t count = 0;
@@ -139,22 +138,27 @@ void LiveTile::prefetch_voxels(std::span<const TilePoint> points) const {
     keys[count++] = point.voxel_key;
     index_.prefetch_slot(point.voxel_key);
   }
-  for (const std::uint32_t key : std::span(keys).first(count)) {
-    const std::uint32_t position = index_.likely_position(key);
-    if (position != PositionIndex::none) prefetch(&at(position));
+  LikelyPositions positions;
+  for (std::size_t k = 0; k < count; ++k) {
+    positions[k] = index_.likely_position(keys[k]);
+    if (positions[k] != PositionIndex::none) prefetch(&at(positions[k]));
   }
+  return positions;
 }
 
-void LiveTile::insert_block(std::span<const TilePoint> points, std::uint32_t scan) {
+void LiveTile::insert_block(std::span<const TilePoint> points, const LikelyPositions& positions,
+                            std::uint32_t scan) {
   std::optional<std::uint32_t> key;
+  auto position = positions.begin();
   LiveVoxel* voxel = nullptr;
   Excluded* excluded = nullptr;
   for (const TilePoint& point : points) {
     const bool makes_voxel = voxel == nullptr && point.motion == Motion::stationary;
     // Neighbours on a beam mostly share a voxel: no look-up for them.
     if (key != point.voxel_key || makes_voxel) {
+      const bool is_next = key != point.voxel_key;
       key = point.voxel_key;
-      voxel = find(point);
+      voxel = find(point, is_next ? *position++ : PositionIndex::none);
       excluded = nullptr;
     }
     if (voxel != nullptr) {

@@ -163,12 +163,18 @@ class LiveTile {
   [[nodiscard]] auto key_at() const {
     return [this](std::uint32_t position) { return at(position).packed.key; };
   }
-  /// Null where there is no such voxel and the point makes none.
-  [[nodiscard]] LiveVoxel* find(const TilePoint& point);
+  /// Null where there is no such voxel and the point makes none. It is looked for at its likely
+  /// position first (PositionIndex).
+  [[nodiscard]] LiveVoxel* find(const TilePoint& point, std::uint32_t likely_position);
   LiveVoxel& add_fresh(std::uint32_t key);
-  void insert_block(std::span<const TilePoint> points, std::uint32_t scan);
-  /// Asks for the memory of the voxels that these points hit.
-  void prefetch_voxels(std::span<const TilePoint> points) const;
+  /// So many points are looked up before they are added: their voxels are on their way meanwhile.
+  static constexpr std::size_t block_size = 64;
+  using LikelyPositions = std::array<std::uint32_t, block_size>;
+  void insert_block(std::span<const TilePoint> points, const LikelyPositions& positions,
+                    std::uint32_t scan);
+  /// Asks for the memory of the voxels that these points hit. Returns their likely positions, one
+  /// for all points that follow each other in a voxel.
+  [[nodiscard]] LikelyPositions prefetch_voxels(std::span<const TilePoint> points) const;
   static void hit(LiveVoxel& voxel, const TilePoint& point, std::uint32_t scan);
   static void add_misses(LiveVoxel& voxel, std::uint32_t misses);
   /// Of objects that moved on, only those voxels are seen through that a ray happens to pass: hides
