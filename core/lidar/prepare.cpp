@@ -4,9 +4,12 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
+#include <limits>
+#include <span>
 
 namespace stillmap {
 namespace {
@@ -29,13 +32,19 @@ class Usable {
         ego_hull_lidar_(config.ego_hull_lidar.cast<float>()),
         has_ego_hull_(!ego_hull_lidar_.isEmpty()) {}
 
-  bool operator()(const Eigen::Vector3f& point_lidar) const {
-    const float squared = point_lidar.squaredNorm();
-    // Written so that NaN fails. Infinity fails for any max_range_m that faults() lets through.
-    if (!(squared >= min_squared_ && squared <= max_squared_ && std::isfinite(squared))) {
-      return false;
+  /// 1 for each of the points that is, else 0.
+  void operator()(std::span<const Eigen::Vector3f> points_lidar,
+                  std::span<std::uint8_t> is_usable) const {
+    for (std::size_t k = 0; k < points_lidar.size(); ++k) {
+      const float squared = points_lidar[k].squaredNorm();
+      // Written so that NaN fails, and infinity whatever max_range_m is.
+      constexpr float most = std::numeric_limits<float>::max();
+      is_usable[k] =
+          (squared >= min_squared_) & (squared <= max_squared_) & (squared <= most) ? 1 : 0;
     }
-    return !has_ego_hull_ || !ego_hull_lidar_.contains(point_lidar);
+    if (!has_ego_hull_) return;
+    for (std::size_t k = 0; k < points_lidar.size(); ++k)
+      if (ego_hull_lidar_.contains(points_lidar[k])) is_usable[k] = 0;
   }
 
  private:
@@ -97,11 +106,19 @@ class ScrewMotion {
 
 std::vector<std::uint32_t> usable_points(const Scan& scan, const PrepareConfig& config) {
   const Usable usable(config);
+  // So many are looked at at once, in vector registers.
+  constexpr std::size_t lanes = 64;
+  std::array<std::uint8_t, lanes> is_usable;
   std::vector<std::uint32_t> indices(scan.size());
   std::size_t count = 0;
-  for (std::size_t i = 0; i < scan.size(); ++i) {
-    indices[count] = static_cast<std::uint32_t>(i);
-    count += usable(scan.points_lidar[i]) ? 1 : 0;
+  for (std::size_t first = 0; first < scan.size(); first += lanes) {
+    const auto points =
+        std::span(scan.points_lidar).subspan(first, std::min(lanes, scan.size() - first));
+    usable(points, is_usable);
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      indices[count] = static_cast<std::uint32_t>(first + k);
+      count += is_usable[k];
+    }
   }
   indices.resize(count);
   return indices;

@@ -215,6 +215,35 @@ TEST(SweepTimes, AreThoseOfTheSweepWhereverTheStampIs) {
   EXPECT_EQ(sweep_times(Scan{}, 0.1).duration_s, 0.0);
 }
 
+TEST(UsablePoints, AreThoseOfALookAtEachOfThem) {
+  PrepareConfig config;
+  config.min_range_m = 1.0;
+  config.max_range_m = 30.0;
+  config.ego_hull_lidar = {Eigen::Vector3d(-2.0, -1.0, -2.0), Eigen::Vector3d(2.0, 1.0, 0.0)};
+  constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
+  constexpr float infinite = std::numeric_limits<float>::infinity();
+  std::mt19937 random(3);
+  std::normal_distribution<float> along(0.0F, 10.0F);
+  std::uniform_int_distribution<int> any(0, 19);
+  Scan scan;
+  for (int i = 0; i < 1000; ++i) {
+    const int kind = any(random);
+    const float x = kind == 0 ? nothing : kind == 1 ? infinite : along(random);
+    const float scale = kind == 2 ? 0.05F : 1.0F;
+    scan.points_lidar.push_back(scale * Eigen::Vector3f(x, along(random), along(random)));
+  }
+  std::vector<std::uint32_t> expected;
+  for (std::uint32_t i = 0; i < 1000; ++i) {
+    const Eigen::Vector3f& p = scan.points_lidar[i];
+    const bool is_ego =
+        std::abs(p.x()) <= 2.0F && std::abs(p.y()) <= 1.0F && p.z() >= -2.0F && p.z() <= 0.0F;
+    if (p.norm() >= 1.0F && p.norm() <= 30.0F && !is_ego) expected.push_back(i);
+  }
+  EXPECT_EQ(usable_points(scan, config), expected);
+  EXPECT_GT(expected.size(), 500U);
+  EXPECT_LT(expected.size(), 950U);
+}
+
 TEST(UsablePoints, AreThoseThatAreKept) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   Scan scan;
