@@ -155,21 +155,24 @@ std::vector<Run> runs_in_cubes(std::span<const Eigen::Vector3f> points,
   std::size_t count = 0;
   std::size_t run_begin = 0;
   std::uint64_t last_cube = ~std::uint64_t{0};
+  const auto end_run = [&](std::size_t end) {
+    if (end == run_begin) return;
+    ++count;
+    // Of two in the middle every other run takes the later one: always the earlier one would again
+    // be a point on one side.
+    runs[count - 1] = {last_cube, chosen[(run_begin + end - 1 + count % 2) / 2]};
+    run_begin = end;
+  };
   for (std::size_t begin = 0; begin < chosen.size(); begin += lanes) {
     const auto some = chosen.subspan(begin, std::min(lanes, chosen.size() - begin));
     const auto cubes = cubes_of(points, some, inverse_spacing);
-    for (std::size_t i = begin; i < begin + some.size(); ++i) {
-      const std::uint64_t cube = cubes[i - begin];
-      if (cube != last_cube) {
-        run_begin = i;
-        ++count;
-      }
-      last_cube = cube;
-      // Of two in the middle every other run takes the later one: always the earlier one would
-      // again be a point on one side.
-      runs[count - 1] = {cube, chosen[(run_begin + i + count % 2) / 2]};
+    for (std::size_t k = 0; k < some.size(); ++k) {
+      if (cubes[k] == last_cube) continue;
+      end_run(begin + k);
+      last_cube = cubes[k];
     }
   }
+  end_run(chosen.size());
   runs.resize(count);
   return runs;
 }
