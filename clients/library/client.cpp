@@ -118,8 +118,13 @@ dds::ServerStatus Client::status() {
 }
 
 MapQueryResult Client::get_static_map(const MapQuery& query) {
-  const auto reply = connection_->call(services::get_static_map, wire::to_request(query));
-  return connection_->require_readable(wire::from_response(reply), services::get_static_map);
+  auto reply = connection_->call(services::get_static_map, wire::to_request(query));
+  auto result = wire::from_response(reply);
+  // More would be of another kind of server than ours.
+  constexpr std::size_t max_kept_voxels = 400'000;
+  if (reply.voxels().x().size() <= max_kept_voxels)
+    connection_->client_of(services::get_static_map).reuse(std::move(reply));
+  return connection_->require_readable(std::move(result), services::get_static_map);
 }
 
 MapQueryResult Client::get_whole_static_map(

@@ -108,12 +108,14 @@ void UntypedServiceClient::send(const SerializedSample& request, const RequestId
 
 bool UntypedServiceClient::receive(const Accept& accept, const std::stop_token& stop,
                                    Clock::time_point deadline) {
-  SerializedSample bytes;
+  // Of a page of the map, as large as servers make it.
+  constexpr std::size_t max_kept_bytes = 8U << 20U;
   eprosima::fastdds::dds::SampleInfo info;
-  while (replies_.take(bytes, info, stop, left_until(deadline))) {
-    if (is_ours(info.related_sample_identity) && accept(bytes)) return true;
-  }
-  return false;
+  bool is_answered = false;
+  while (!is_answered && replies_.take(received_, info, stop, left_until(deadline)))
+    is_answered = is_ours(info.related_sample_identity) && accept(received_);
+  if (received_.capacity() > max_kept_bytes) SerializedSample().swap(received_);
+  return is_answered;
 }
 
 bool UntypedServiceClient::is_ours(const eprosima::fastrtps::rtps::SampleIdentity& answered) const {

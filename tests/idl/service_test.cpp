@@ -93,6 +93,38 @@ TEST(Service, CarriesAReplyOfMegabytes) {
   EXPECT_EQ(reply->file().size(), 5'000'000U);
 }
 
+TEST(Service, ReadsAnAnswerIntoTheMemoryOfOneThatIsHandedBack) {
+  using stillmap_msgs::srv::GetStaticMap_Request;
+  using stillmap_msgs::srv::GetStaticMap_Response;
+  Participant server_side(loopback(false));
+  const ServiceServer<GetStaticMap_Request, GetStaticMap_Response> server(
+      server_side, "stillmap/get_static_map", [](const GetStaticMap_Request& request) {
+        GetStaticMap_Response reply;
+        reply.voxels().x().resize(request.max_bytes(), request.resolution_m() > 1.0 ? 2.0F : 1.0F);
+        return reply;
+      });
+  Participant client_side(loopback(false));
+  ServiceClient<GetStaticMap_Request, GetStaticMap_Response> client(client_side,
+                                                                    "stillmap/get_static_map");
+  const auto answer = [&](std::uint32_t voxels, double resolution_m) {
+    GetStaticMap_Request request;
+    request.max_bytes(voxels);
+    request.resolution_m(resolution_m);
+    return client.call(request, discovery_timeout);
+  };
+  auto first = answer(100'000, 0.5);
+  ASSERT_TRUE(first);
+  const float* const memory = first->voxels().x().data();
+  client.reuse(*std::move(first));
+  const auto second = answer(50'000, 2.0);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->voxels().x().data(), memory);
+  EXPECT_EQ(second->voxels().x(), std::vector<float>(50'000, 2.0F));
+  const auto third = answer(60'000, 0.5);
+  ASSERT_TRUE(third);
+  EXPECT_NE(third->voxels().x().data(), memory) << "is the second one's";
+}
+
 TEST(Service, WaitsForAServerThatComesLater) {
   Participant client_side(loopback(false));
   Client client(client_side, "stillmap/save_map");
