@@ -9,7 +9,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
 #include "core/dataset/binary_file.hpp"
@@ -17,6 +16,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "core/lidar/label_kind.hpp"
 #include "core/lidar/point_fields.hpp"
+#include "core/process/file_beside.hpp"
 
 namespace stillmap {
 namespace {
@@ -161,42 +161,11 @@ void pack_ply(const ColouredPoint& point, char* to) {
              << rgb.b << label_of(point) << point.confidence;
 }
 
-/// Where to write what becomes the file `real`: beside it, so that one that is there stays until
-/// the new one is whole; into it where it is a pipe or the like.
-std::filesystem::path written_first(const std::filesystem::path& real) {
-  std::error_code ignored;
-  const std::filesystem::file_status there = std::filesystem::status(real, ignored);
-  if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there)) return real;
-  return real.string() + ".unfinished";
-}
-
-/// Into a file whose place is somebody else's, as one that a container has mounted, its content is
-/// copied.
-void put_in_place(const std::filesystem::path& unfinished, const std::filesystem::path& real,
-                  std::error_code& fault) {
-  std::filesystem::rename(unfinished, real, fault);
-  if (!fault || !std::filesystem::exists(real)) return;
-  fault.clear();
-  std::filesystem::copy_file(unfinished, real, std::filesystem::copy_options::overwrite_existing,
-                             fault);
-  std::error_code ignored;
-  std::filesystem::remove(unfinished, ignored);
-}
-
 template <std::size_t point_bytes, class Pack>
 void write_cloud(const std::filesystem::path& file, const std::string& header,
                  std::span<const ColouredPoint> points, Pack pack) {
-  std::error_code fault;
-  // A link stays, and what it leads to is replaced.
-  const std::filesystem::path resolved = std::filesystem::weakly_canonical(file, fault);
-  const std::filesystem::path real = fault ? file : resolved;
-  std::filesystem::path unfinished = written_first(real);
-  std::ofstream out(unfinished, std::ios::binary | std::ios::trunc);
-  if (!out && unfinished != real && std::filesystem::exists(real, fault)) {
-    // A file in a folder that takes no other one.
-    unfinished = real;
-    out.open(real, std::ios::binary | std::ios::trunc);
-  }
+  FileBeside beside(file);
+  std::ofstream out(beside.path(), std::ios::binary | std::ios::trunc);
   out << header;
   std::array<char, point_bytes> bytes{};
   for (const ColouredPoint& point : points) {
@@ -204,10 +173,7 @@ void write_cloud(const std::filesystem::path& file, const std::string& header,
     out.write(bytes.data(), point_bytes);
   }
   out.close();
-  fault.clear();
-  if (out && unfinished != real) put_in_place(unfinished, real, fault);
-  if (out && !fault) return;
-  if (unfinished != real) std::filesystem::remove(unfinished, fault);
+  if (out && !beside.put_in_place()) return;
   throw DatasetWriteError(file, "cannot be written; check the folder and the space left");
 }
 

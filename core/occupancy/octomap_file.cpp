@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "core/occupancy/octomap_data.hpp"
+#include "core/process/file_beside.hpp"
 
 namespace stillmap {
 namespace {
@@ -71,16 +72,11 @@ bool is_binary_octomap(const fs::path& file) {
 
 void write_octomap_file(const fs::path& file, const OctomapData& data) {
   assert(is_binary_octomap(file) == data.binary);
-  fs::path unfinished = file;
-  unfinished += ".unfinished";
-  std::ofstream out(unfinished, std::ios::binary | std::ios::trunc);
+  FileBeside beside(file);
+  std::ofstream out(beside.path(), std::ios::binary | std::ios::trunc);
   out << header_of(data, check_octomap(data).nodes) << data.bytes;
   out.close();
-  std::error_code error;
-  if (out) fs::rename(unfinished, file, error);
-  if (out && !error) return;
-  std::error_code ignored;
-  fs::remove(unfinished, ignored);
+  if (out && !beside.put_in_place()) return;
   throw MapFileWriteError(file, "cannot be written; check the folder and the space left");
 }
 

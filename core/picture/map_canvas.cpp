@@ -11,6 +11,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/process/file_beside.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -169,7 +171,10 @@ cv::Mat draw_legend(int width_px, const std::string& title,
 
 void write_png(const std::filesystem::path& file, const cv::Mat& picture) {
   assert(picture.type() == CV_8UC3);
-  if (file.extension() == ".png" && write_bgr(file, picture)) return;
+  if (file.extension() == ".png") {
+    FileBeside beside(file);
+    if (write_bgr(beside.path(), picture) && !beside.put_in_place()) return;
+  }
   throw std::runtime_error(file.string() +
                            ": the picture cannot be written; its folder must exist and be "
                            "writable, its name end in .png");

@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "core/process/file_beside.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -22,13 +24,15 @@ char shade_of(std::int8_t value) {
   return value == occupancy_lethal ? occupied_shade : free_shade;
 }
 
-void write_file(const fs::path& file, const std::string& content) {
-  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+[[noreturn]] void throw_unwritten(const fs::path& file) {
+  throw std::runtime_error(file.string() + ": cannot be written; check folder and space left");
+}
+
+void write_file(const fs::path& file, const std::string& content, const FileBeside& beside) {
+  std::ofstream out(beside.path(), std::ios::binary | std::ios::trunc);
   out.write(content.data(), static_cast<std::streamsize>(content.size()));
   out.close();
-  if (!out) {
-    throw std::runtime_error(file.string() + ": cannot be written; check folder and space left");
-  }
+  if (!out) throw_unwritten(file);
 }
 
 std::string image_of(const OccupancyGrid& grid) {
@@ -57,8 +61,15 @@ void write_nav2_map(const fs::path& folder, const OccupancyGrid& grid) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw std::runtime_error(folder.string() + ": cannot be made: " + error.message());
-  write_file(folder / "map.pgm", image_of(grid));
-  write_file(folder / "map.yaml", description_of(grid));
+  const fs::path image = folder / "map.pgm";
+  const fs::path description = folder / "map.yaml";
+  FileBeside image_beside(image);
+  FileBeside description_beside(description);
+  write_file(image, image_of(grid), image_beside);
+  write_file(description, description_of(grid), description_beside);
+  // Once both are whole: they belong together.
+  if (image_beside.put_in_place()) throw_unwritten(image);
+  if (description_beside.put_in_place()) throw_unwritten(description);
 }
 
 }  // namespace stillmap

@@ -2,17 +2,16 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
-#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <iterator>
 #include <random>
 
 #include "core/dataset/dataset_error.hpp"
+#include "tests/file_size_limit.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {
@@ -213,23 +212,6 @@ TEST(PointCloudFiles, AnEmptyMapCanBeWrittenAndRead) {
   EXPECT_TRUE(read_point_cloud(folder.path() / "map.ply", 0).scan.empty());
   EXPECT_THROW(write_ply(folder.path() / "no" / "map.ply", {}), DatasetError);
 }
-
-/// Of no file more than this is written, as on a full disk.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) {
-    std::signal(SIGXFSZ, SIG_IGN);
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit{.rlim_cur = bytes, .rlim_max = before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() { setrlimit(RLIMIT_FSIZE, &before_); }
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-
- private:
-  rlimit before_{};
-};
 
 TEST(PointCloudFiles, AMapThatFindsNoRoomLeavesTheOneBeforeIt) {
   const ScratchFolder folder;

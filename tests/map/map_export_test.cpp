@@ -8,6 +8,7 @@
 
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/point_cloud_files.hpp"
+#include "tests/file_size_limit.hpp"
 #include "tests/map/map_worlds.hpp"
 #include "tests/scratch_folder.hpp"
 
@@ -193,6 +194,22 @@ TEST(GeoExport, TurnsTheMapByTheAzimuthOfItsXAxis) {
   // x to the north, so y to the west.
   EXPECT_GT(raster.lat_lon(20, 10).x(), origin.x() + 4e-5);
   EXPECT_LT(raster.lat_lon(8, 0).y(), origin.y() - 4e-5);
+}
+
+TEST(GeoExport, FilesThatFindNoRoomLeaveThoseBeforeThem) {
+  const ScratchFolder folder;
+  export_geotiff(small_map(), 0.5, Datum{}, folder / "map.tif");
+  const std::string classes = content_of(folder / "map.tif");
+  const std::string heights = content_of(folder / "map_height.tif");
+  std::vector<QueryVoxel> larger = small_map();
+  larger.push_back(voxel(90.0F, 90.0F, 0.0F, SemanticClass::road));
+  {
+    const FileSizeLimit limit(1000);
+    EXPECT_THROW(export_geotiff(larger, 0.5, Datum{}, folder / "map.tif"), DatasetWriteError);
+  }
+  EXPECT_EQ(content_of(folder / "map.tif"), classes);
+  EXPECT_EQ(content_of(folder / "map_height.tif"), heights);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 2);
 }
 
 TEST(GeoExport, NamesAFileThatCannotBeWritten) {

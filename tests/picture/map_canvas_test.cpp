@@ -7,6 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
+#include "tests/file_size_limit.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {
@@ -30,6 +31,18 @@ std::string refusal(const std::filesystem::path& file) {
     return error.what();
   }
   return {};
+}
+
+TEST(MapCanvas, PictureThatFindsNoRoomLeavesTheOneBeforeIt) {
+  const ScratchFolder folder;
+  write_png(folder / "a.png", colourful(3, 3));
+  const std::string before = content_of(folder / "a.png");
+  {
+    const FileSizeLimit limit(200);
+    EXPECT_THROW(write_png(folder / "a.png", colourful(200, 200)), std::runtime_error);
+  }
+  EXPECT_EQ(content_of(folder / "a.png"), before);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
 }
 
 TEST(MapCanvas, HoldsEveryPixelAsAnotherReaderSeesIt) {

@@ -5,6 +5,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 
+#include "tests/file_size_limit.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {
@@ -58,6 +59,24 @@ TEST(Nav2Map, DescriptionHasWhatMapServerAsksFor) {
   EXPECT_THAT(yaml, HasSubstr("origin: [-3.500000, 12.250000, 0]"));
   EXPECT_THAT(yaml, HasSubstr("negate: 0"));
   EXPECT_DOUBLE_EQ(value_of(yaml, "resolution"), 0.25);
+}
+
+TEST(Nav2Map, OneThatFindsNoRoomLeavesTheOneBeforeIt) {
+  const ScratchFolder folder;
+  write_nav2_map(folder.path(), small_grid());
+  const std::string image = content_of(folder / "map.pgm");
+  const std::string yaml = content_of(folder / "map.yaml");
+  OccupancyGrid other = small_grid();
+  other.origin_map.x() += 1.0;
+  other.data.front() = occupancy_lethal;
+  {
+    // Enough for the image, not for its description.
+    const FileSizeLimit limit(image.size());
+    EXPECT_THROW(write_nav2_map(folder.path(), other), std::runtime_error);
+  }
+  EXPECT_EQ(content_of(folder / "map.pgm"), image);
+  EXPECT_EQ(content_of(folder / "map.yaml"), yaml);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 2);
 }
 
 TEST(Nav2Map, SaysWhyNothingCanBeWritten) {

@@ -7,6 +7,7 @@
 
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
+#include "core/process/file_beside.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -122,19 +123,16 @@ void check_plan_file(const std::filesystem::path& file) {
 
 void write_plan(const std::filesystem::path& file, const TimedPlan& timed) {
   check_plan_file(file);
-  // Beside it and moved: a reader finds a whole path, the earlier one or this.
-  const std::filesystem::path unfinished = file.string() + ".unfinished";
-  std::ofstream out(unfinished, std::ios::trunc);
+  // A reader finds a whole path, the earlier one or this.
+  FileBeside beside(file);
+  std::ofstream out(beside.path(), std::ios::trunc);
   if (file.extension() == ".csv") {
     write_csv(out, timed.plan);
   } else {
     out << to_json(timed, true).dump(1) << '\n';
   }
   out.close();
-  std::error_code fault;
-  if (out) std::filesystem::rename(unfinished, file, fault);
-  if (out && !fault) return;
-  std::filesystem::remove(unfinished, fault);
+  if (out && !beside.put_in_place()) return;
   throw std::runtime_error(file.string() +
                            ": cannot be written; its folder must exist and be writable");
 }

@@ -14,6 +14,7 @@
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/picture/traversability_picture.hpp"
+#include "core/process/file_beside.hpp"
 #include "core/traversability/nav2_map.hpp"
 #include "core/traversability/traversability_map.hpp"
 #include "core/traversability/traversability_query.hpp"
@@ -62,12 +63,12 @@ Json to_json(const TraversabilityAnswer& answer, const std::string& profile) {
 /// Throws std::runtime_error naming the file when it cannot be written.
 void write_outlines(const std::string& file, const TraversabilityAnswer& answer,
                     const std::string& profile) {
-  std::ofstream stream(file, std::ios::trunc);
+  FileBeside beside(file);
+  std::ofstream stream(beside.path(), std::ios::trunc);
   stream << to_json(answer, profile).dump(1) << "\n";
   stream.close();
-  if (!stream) {
-    throw std::runtime_error(file + ": cannot be written; its folder must exist and be writable");
-  }
+  if (stream && !beside.put_in_place()) return;
+  throw std::runtime_error(file + ": cannot be written; its folder must exist and be writable");
 }
 
 double square_metres(const TraversabilityView& view, std::uint64_t cells) {

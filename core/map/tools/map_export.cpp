@@ -14,6 +14,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/point_cloud_files.hpp"
 #include "core/lidar/semantic_class.hpp"
+#include "core/process/file_beside.hpp"
 
 namespace stillmap {
 namespace {
@@ -80,12 +81,13 @@ TIFFFieldInfo field(ttag_t tag, const char* name, short values, TIFFDataType typ
 /// A TIFF that is being written. libtiff's errors are kept instead of printed.
 class TiffWriter {
  public:
-  explicit TiffWriter(fs::path file) : file_(std::move(file)) {
+  /// `beside` is where `file` is written.
+  TiffWriter(fs::path file, const FileBeside& beside) : file_(std::move(file)) {
     const std::unique_ptr<TIFFOpenOptions, decltype(&TIFFOpenOptionsFree)> options(
         TIFFOpenOptionsAlloc(), &TIFFOpenOptionsFree);
     TIFFOpenOptionsSetErrorHandlerExtR(options.get(), &keep_error, &error_);
     TIFFOpenOptionsSetWarningHandlerExtR(options.get(), &ignore, nullptr);
-    tiff_.reset(TIFFOpenExt(file_.c_str(), "w", options.get()));
+    tiff_.reset(TIFFOpenExt(beside.path().c_str(), "w", options.get()));
     require(tiff_ != nullptr);
     constexpr short any = TIFF_VARIABLE;
     const std::array<TIFFFieldInfo, 6> fields{
@@ -215,8 +217,9 @@ std::string metadata_item(const std::string& attributes, const std::string& valu
   return "<Item " + attributes + ">" + value + "</Item>";
 }
 
-void write_classes(const TopView& top, const Datum& datum, const fs::path& file) {
-  TiffWriter tiff(file);
+void write_classes(const TopView& top, const Datum& datum, const fs::path& file,
+                   const FileBeside& beside) {
+  TiffWriter tiff(file, beside);
   set_layout(tiff, top, datum);
   std::array<std::array<std::uint16_t, 256>, 3> palette{};
   std::string metadata =
@@ -238,11 +241,12 @@ void write_classes(const TopView& top, const Datum& datum, const fs::path& file)
   tiff.write(top, top.label);
 }
 
-void write_heights(TopView top, const Datum& datum, const fs::path& file) {
+void write_heights(TopView top, const Datum& datum, const fs::path& file,
+                   const FileBeside& beside) {
   for (float& height_m : top.height_m) {
     if (height_m != TopView::no_height) height_m += static_cast<float>(datum.altitude_m);
   }
-  TiffWriter tiff(file);
+  TiffWriter tiff(file, beside);
   set_layout(tiff, top, datum);
   tiff.set(TIFFTAG_BITSPERSAMPLE, 32);
   tiff.set(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_IEEEFP);
@@ -255,6 +259,11 @@ void write_heights(TopView top, const Datum& datum, const fs::path& file) {
                .c_str());
   tiff.set(gdal_no_data_tag, "-9999");
   tiff.write(top, top.height_m);
+}
+
+void put_in_place(const fs::path& file, FileBeside& beside) {
+  if (const std::error_code fault = beside.put_in_place())
+    throw DatasetWriteError(file, "cannot be written (" + fault.message() + ")");
 }
 
 }  // namespace
@@ -292,8 +301,14 @@ fs::path height_file_of(const fs::path& class_file) {
 void export_geotiff(std::span<const QueryVoxel> voxels, double cell_size_m, const Datum& datum,
                     const fs::path& file) {
   const TopView top = rasterize_top_view(voxels, cell_size_m);
-  write_classes(top, datum, file);
-  write_heights(top, datum, height_file_of(file));
+  const fs::path heights = height_file_of(file);
+  FileBeside classes_beside(file);
+  FileBeside heights_beside(heights);
+  write_classes(top, datum, file, classes_beside);
+  write_heights(top, datum, heights, heights_beside);
+  // Once both are whole: they belong together.
+  put_in_place(file, classes_beside);
+  put_in_place(heights, heights_beside);
 }
 
 }  // namespace stillmap
