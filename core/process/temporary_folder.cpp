@@ -1,11 +1,17 @@
 #include "core/process/temporary_folder.hpp"
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <cerrno>
 #include <cstdlib>
 #include <mutex>
 #include <set>
 #include <string>
 #include <system_error>
+#include <vector>
 
 namespace stillmap {
 namespace {
@@ -17,6 +23,55 @@ struct FoldersOfProcess {
   std::set<fs::path> paths;
 };
 
+/// The folder, opened and locked: a lock ends with its process however that ends, and is one for
+/// all containers of a machine, whose processes' numbers are not. -1 where another process has it,
+/// or the file system knows no locks of folders.
+int lock(const fs::path& folder, int how) {
+  const int opened = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+  if (opened < 0 || ::flock(opened, how) == 0) return opened;
+  ::close(opened);
+  return -1;
+}
+
+/// Whether the folder that was opened is the one that the name leads to.
+bool is_still(int opened, const fs::path& folder) {
+  struct stat known {};
+  struct stat there {};
+  return ::fstat(opened, &known) == 0 && ::lstat(folder.c_str(), &there) == 0 &&
+         known.st_dev == there.st_dev && known.st_ino == there.st_ino;
+}
+
+bool is_own(int opened) {
+  struct stat known {};
+  return ::fstat(opened, &known) == 0 && known.st_uid == ::geteuid();
+}
+
+/// Those of other users stay.
+void remove_those_of_the_dead(const fs::path& prefix) {
+  const std::string name = prefix.filename().string();
+  std::error_code fault;
+  std::vector<fs::path> found;
+  for (fs::directory_iterator one(prefix.parent_path(), fault), end; !fault && one != end;
+       one.increment(fault)) {
+    if (one->path().filename().string().starts_with(name)) found.push_back(one->path());
+  }
+  for (const fs::path& folder : found) {
+    const int locked = lock(folder, LOCK_EX | LOCK_NB);
+    if (locked < 0) continue;
+    if (is_own(locked)) fs::remove_all(folder, fault);
+    ::close(locked);
+  }
+}
+
+fs::path make_folder(const fs::path& prefix) {
+  std::string name = prefix.string() + "XXXXXX";
+  if (::mkdtemp(name.data()) == nullptr) {
+    throw fs::filesystem_error("cannot make a folder", name,
+                               std::error_code(errno, std::generic_category()));
+  }
+  return name;
+}
+
 /// Never destroyed: a signal may come while the program ends.
 FoldersOfProcess& folders_of_process() {
   static auto& folders = *new FoldersOfProcess;
@@ -25,24 +80,34 @@ FoldersOfProcess& folders_of_process() {
 
 }  // namespace
 
-TemporaryFolder::TemporaryFolder(const fs::path& prefix) {
-  std::string name = fs::absolute(prefix).string() + "XXXXXX";
+TemporaryFolder::TemporaryFolder(const fs::path& prefix, OfTheDead of_the_dead) {
+  fs::path full_prefix = fs::absolute(prefix);
   FoldersOfProcess& folders = folders_of_process();
-  const std::scoped_lock lock(folders.mutex);
-  if (::mkdtemp(name.data()) == nullptr) {
-    throw fs::filesystem_error("cannot make a folder", name,
-                               std::error_code(errno, std::generic_category()));
+  const std::scoped_lock turn(folders.mutex);
+  if (of_the_dead == OfTheDead::keep) {
+    path_ = make_folder(full_prefix);
+  } else {
+    full_prefix += "held-";
+    remove_those_of_the_dead(full_prefix);
+    path_ = make_folder(full_prefix);
+    held_ = lock(path_, LOCK_EX);
+    // Before it had its lock, another process could take it for one of the dead.
+    while (held_ >= 0 && !is_still(held_, path_)) {
+      ::close(held_);
+      path_ = make_folder(full_prefix);
+      held_ = lock(path_, LOCK_EX);
+    }
   }
-  path_ = name;
   folders.paths.insert(path_);
 }
 
 TemporaryFolder::~TemporaryFolder() {
   FoldersOfProcess& folders = folders_of_process();
-  const std::scoped_lock lock(folders.mutex);
+  const std::scoped_lock turn(folders.mutex);
   std::error_code ignored;
   fs::remove_all(path_, ignored);
   folders.paths.erase(path_);
+  if (held_ >= 0) ::close(held_);
 }
 
 void TemporaryFolder::remove_all_at_end() {

@@ -166,8 +166,8 @@ void Bag::open_file(const fs::path& file) {
   if (file.extension() == ".zstd") {
     if (!decompressed_) {
       try {
-        decompressed_ =
-            std::make_unique<TemporaryFolder>(fs::temp_directory_path() / "stillmap-bag-");
+        decompressed_ = std::make_unique<TemporaryFolder>(
+            fs::temp_directory_path() / "stillmap-bag-", TemporaryFolder::OfTheDead::remove);
       } catch (const fs::filesystem_error& error) {
         throw DatasetError(error.path1(),
                            "cannot be made; check the folder for temporary files (TMPDIR)");

@@ -52,7 +52,7 @@ fs::path end_of_links(const fs::path& file) {
 std::shared_ptr<const TemporaryFolder> scratch_folder() {
   const fs::path prefix = fs::temp_directory_path() / "stillmap-";
   try {
-    return std::make_shared<const TemporaryFolder>(prefix);
+    return std::make_shared<const TemporaryFolder>(prefix, TemporaryFolder::OfTheDead::remove);
   } catch (const fs::filesystem_error& error) {
     throw MapFileError(error.path1(), "cannot be made; set TMPDIR to a folder that can be written");
   }

@@ -31,7 +31,8 @@ fs::path readable(fs::path file) {
 
 TemporaryFolder folder_for_copy_of(const fs::path& file) {
   try {
-    return TemporaryFolder(fs::temp_directory_path() / "stillmap-read-");
+    return TemporaryFolder(fs::temp_directory_path() / "stillmap-read-",
+                           TemporaryFolder::OfTheDead::remove);
   } catch (const fs::filesystem_error& error) {
     throw MapFileWriteError(
         file, std::string("cannot be copied to a temporary folder to be read (") + error.what() +
