@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/frames/rigid_motion.hpp"
-#include "core/localization/level_plane.hpp"
+#include "core/lidar/level_plane.hpp"
 #include "core/odometry/features.hpp"
 
 namespace stillmap {

@@ -1,4 +1,4 @@
-#include "core/localization/level_plane.hpp"
+#include "core/lidar/level_plane.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
