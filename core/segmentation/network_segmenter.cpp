@@ -16,6 +16,7 @@
 #include "core/lidar/measured_elevation.hpp"
 #include "core/lidar/range_image.hpp"
 #include "core/segmentation/beam_origin.hpp"
+#include "core/segmentation/lidar_stance.hpp"
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/network_input.hpp"
 
@@ -74,6 +75,20 @@ std::optional<std::pair<double, double>> field_of_view(std::span<const Eigen::Ve
   const std::size_t cut = elevations.size() / 1000;
   const std::pair field(at(cut), at(elevations.size() - 1 - cut));
   return field.second - field.first > least_rad ? std::optional(field) : std::nullopt;
+}
+
+/// A lean that nobody told and the ground shows. Less costs little, and lidars that count as
+/// upright lean by 2 degrees against the road, by 3 where it begins to rise.
+constexpr double least_seen_tilt_rad = 0.07;
+
+/// What brings z to heights that the model has seen, of a lidar that the ground shows so much
+/// higher than that [m]: nothing of what such lidars differ by among themselves, all of what only
+/// another vehicle explains, and a part of it between, since a height lies now on this side of any
+/// step and now on that.
+float seen_raise_m(double higher_m) {
+  constexpr double usual_m = 0.15, other_m = 0.45;
+  const double share = std::clamp((std::abs(higher_m) - usual_m) / (other_m - usual_m), 0.0, 1.0);
+  return static_cast<float>(share * higher_m);
 }
 
 PointLabels labels_of_own_pixel(const RangeImage& image, const PixelLabels& pixels) {
@@ -204,6 +219,23 @@ struct NetworkSegmenter::View {
   ProjectionModel projection;
   /// See raised_m().
   float raised_m = 0.0F;
+
+  /// The image of these, over the elevations that they are at.
+  void show_instead(std::vector<Eigen::Vector3f> points) {
+    moved_points = std::move(points);
+    moves_image = true;
+    if (const auto field = field_of_view(moved_points)) {
+      projection.fov_down = field->first;
+      projection.fov_up = field->second;
+    }
+  }
+
+  /// These, turned by what the lidar leans.
+  void show_turned(std::vector<Eigen::Vector3f> points, const LidarTilt& tilt) {
+    moved_points = std::move(points);
+    moves_image = tilt.turns_image();
+    projection = tilt.widened(projection);
+  }
 };
 
 NetworkSegmenter::View NetworkSegmenter::view_of(const Scan& scan, const Mount& mount) const {
@@ -212,28 +244,43 @@ NetworkSegmenter::View NetworkSegmenter::view_of(const Scan& scan, const Mount& 
             .projection = model_.projection(),
             .raised_m = raised_m(mount)};
   if (!mount.tilt.is_upright()) {
-    view.moved_points = mount.tilt.turned(scan.points_lidar);
+    std::vector<Eigen::Vector3f> turned = mount.tilt.turned(scan.points_lidar);
     // An image of fixed size is that of the published projection: what a turned one shows would not
     // fit into its field of view.
-    if (!model_.follow_sensor) return view;
-    view.projection = mount.tilt.widened(view.projection);
-    view.moves_image = mount.tilt.turns_image();
-    return view;
+    if (model_.follow_sensor) {
+      view.show_turned(std::move(turned), mount.tilt);
+    } else {
+      view.moved_points = std::move(turned);
+    }
+  } else if (model_.follow_sensor && model_.lidar_height_m && !mount.height_m) {
+    look_for_mount(scan.points_lidar, view);
   }
-  if (!model_.follow_sensor || !model_.lidar_height_m || mount.height_m) return view;
-  const auto height_m = lidar_height_over_origin(scan.points_lidar, *model_.lidar_height_m);
-  if (!height_m) return view;
-  view.moved_points = scan.points_lidar;
-  for (Eigen::Vector3f& p : view.moved_points) {
-    if (is_measured(p)) p.z() -= static_cast<float>(*height_m);
-  }
-  if (const auto field = field_of_view(view.moved_points)) {
-    view.projection.fov_down = field->first;
-    view.projection.fov_up = field->second;
-  }
-  view.moves_image = true;
-  view.raised_m = static_cast<float>(*height_m - *model_.lidar_height_m);
   return view;
+}
+
+void NetworkSegmenter::look_for_mount(std::span<const Eigen::Vector3f> points, View& view) const {
+  if (const auto height_m = lidar_height_over_origin(points, *model_.lidar_height_m)) {
+    std::vector<Eigen::Vector3f> lowered(points.begin(), points.end());
+    for (Eigen::Vector3f& p : lowered) {
+      if (is_measured(p)) p.z() -= static_cast<float>(*height_m);
+    }
+    view.show_instead(std::move(lowered));
+    view.raised_m = static_cast<float>(*height_m - *model_.lidar_height_m);
+    return;
+  }
+  const auto stance = stance_over_ground(points);
+  if (!stance) return;
+  view.raised_m = seen_raise_m(stance->height_m - *model_.lidar_height_m);
+  if (stance->tilt_rad < least_seen_tilt_rad) return;
+  const LidarTilt tilt(stance->R_level_lidar);
+  std::vector<Eigen::Vector3f> turned = tilt.turned(points);
+  // A cloud that was turned after it was measured (to the axes of a robot, say) has its rows where
+  // the lidar was upright.
+  if (has_fewer_elevations(turned, points)) {
+    view.show_instead(std::move(turned));
+  } else {
+    view.show_turned(std::move(turned), tilt);
+  }
 }
 
 PointLabels NetworkSegmenter::segment_with(SegmentationNetwork& network, int columns,

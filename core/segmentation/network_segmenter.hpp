@@ -5,6 +5,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -65,6 +66,8 @@ class NetworkSegmenter final : public Segmenter {
 
   struct View;
   [[nodiscard]] View view_of(const Scan& scan, const Mount& mount) const;
+  /// Where nobody told a mount: what these points show of it.
+  void look_for_mount(std::span<const Eigen::Vector3f> points, View& view) const;
   [[nodiscard]] PointLabels segment_with(SegmentationNetwork& network, int columns,
                                          const Mount& mount, const Scan& scan) const;
   /// What brings z to the heights that the model has seen [m].

@@ -1,0 +1,166 @@
+#include "core/segmentation/lidar_stance.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <vector>
+
+#include "core/segmentation/network_segmenter.hpp"
+#include "tests/segmentation/sample_model.hpp"
+
+namespace stillmap {
+namespace {
+
+constexpr double rad_per_deg = std::numbers::pi / 180.0;
+
+Eigen::Matrix3d leaning(double roll_deg, double pitch_deg) {
+  return (Eigen::AngleAxisd(pitch_deg * rad_per_deg, Eigen::Vector3d::UnitY()) *
+          Eigen::AngleAxisd(roll_deg * rad_per_deg, Eigen::Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+
+/// Ground that rises by `slope_ahead` from `rise_from_m` ahead on, in a court of 50 m x 36 m whose
+/// middle the lidar is over, as its 40 beams see them.
+struct Court {
+  double height_m = 1.7;
+  Eigen::Matrix3d R_world_lidar = Eigen::Matrix3d::Identity();
+  double slope_ahead = 0.0;
+  double rise_from_m = 0.0;
+
+  [[nodiscard]] std::vector<Eigen::Vector3f> scan() const {
+    std::vector<Eigen::Vector3f> points;
+    for (int beam = 0; beam < 40; ++beam) {
+      const double elevation = (8.0 - 0.8 * beam) * rad_per_deg;
+      for (int column = 0; column < 720; ++column) {
+        const double azimuth = (0.5 * column + 0.1) * rad_per_deg;
+        const Eigen::Vector3d beam_lidar(std::cos(elevation) * std::cos(azimuth),
+                                         std::cos(elevation) * std::sin(azimuth),
+                                         std::sin(elevation));
+        points.push_back((distance_m(R_world_lidar * beam_lidar) * beam_lidar).cast<float>());
+      }
+    }
+    return points;
+  }
+
+ private:
+  [[nodiscard]] double distance_m(const Eigen::Vector3d& beam) const {
+    double nearest_m = std::min(25.0 / std::abs(beam.x()), 18.0 / std::abs(beam.y()));
+    if (beam.z() < 0.0 && height_m * beam.x() / -beam.z() <= rise_from_m)
+      nearest_m = std::min(nearest_m, height_m / -beam.z());
+    const double falls = slope_ahead * beam.x() - beam.z();
+    const double to_rise_m = (height_m + slope_ahead * rise_from_m) / falls;
+    if (falls > 0.0 && to_rise_m * beam.x() > rise_from_m)
+      nearest_m = std::min(nearest_m, to_rise_m);
+    return nearest_m;
+  }
+};
+
+TEST(LidarStance, IsReadOffTheGround) {
+  const Court upright{.height_m = 0.6};
+  const auto stance = stance_over_ground(upright.scan());
+  ASSERT_TRUE(stance);
+  EXPECT_NEAR(stance->height_m, 0.6, 0.02);
+  EXPECT_LT(stance->tilt_rad, 0.2 * rad_per_deg);
+  for (const auto& [roll_deg, pitch_deg] : {std::pair(0.0, 6.0), {-9.0, 4.0}, {0.0, -15.0}}) {
+    const Eigen::Matrix3d R_world_lidar = leaning(roll_deg, pitch_deg);
+    const auto found = stance_over_ground(Court{.R_world_lidar = R_world_lidar}.scan());
+    ASSERT_TRUE(found) << roll_deg << ' ' << pitch_deg;
+    EXPECT_NEAR(found->height_m, 1.7, 0.03);
+    EXPECT_NEAR(found->tilt_rad, std::acos(R_world_lidar(2, 2)), 0.3 * rad_per_deg);
+    EXPECT_LT((found->R_level_lidar.row(2) - R_world_lidar.row(2)).norm(), 0.006);
+  }
+}
+
+TEST(LidarStance, IsNotThatAgainstARiseAhead) {
+  for (const double rise_from_m : {1.0, 4.0, 8.0}) {
+    for (const double slope : {0.06, 0.1, 0.2, 0.3}) {
+      const auto found =
+          stance_over_ground(Court{.slope_ahead = slope, .rise_from_m = rise_from_m}.scan());
+      EXPECT_LT(found ? found->tilt_rad : 0.0, 3.0 * rad_per_deg) << slope << ' ' << rise_from_m;
+    }
+  }
+}
+
+TEST(LidarStance, NeedsGround) {
+  EXPECT_FALSE(stance_over_ground({}));
+  const std::vector<Eigen::Vector3f> nothing(
+      1000, Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
+  EXPECT_FALSE(stance_over_ground(nothing));
+  // Walls alone, and the ground of a frame whose origin lies on it.
+  std::vector<Eigen::Vector3f> walls = Court{}.scan();
+  std::erase_if(walls, [](const Eigen::Vector3f& p) { return p.z() < -1.6F; });
+  EXPECT_FALSE(stance_over_ground(walls));
+  std::vector<Eigen::Vector3f> lowered = Court{}.scan();
+  for (Eigen::Vector3f& p : lowered) p.z() += 1.7F;
+  EXPECT_FALSE(stance_over_ground(lowered));
+}
+
+TEST(LidarStance, TellsAlongWhichAxesTheBeamsHaveRows) {
+  const std::vector<Eigen::Vector3f> leans = Court{.R_world_lidar = leaning(0.0, 6.0)}.scan();
+  std::vector<Eigen::Vector3f> level = leans;
+  for (Eigen::Vector3f& p : level) p = leaning(0.0, 6.0).cast<float>() * p;
+  EXPECT_TRUE(has_fewer_elevations(leans, level));
+  EXPECT_FALSE(has_fewer_elevations(level, leans));
+  EXPECT_FALSE(has_fewer_elevations(leans, leans));
+  EXPECT_FALSE(has_fewer_elevations({}, {}));
+}
+
+/// Keeps how high all that the last image showed lies, as the network has it [m].
+class KeepsHeights final : public SegmentationNetwork {
+ public:
+  KeepsHeights(const InputStatistics& statistics, std::vector<float>& heights_m)
+      : statistics_(statistics), heights_m_(heights_m) {}
+  PixelOutputs run(std::span<const float> input) override {
+    const std::size_t pixels = input.size() / plain_input_channels;
+    const auto heights = input.subspan(index(InputChannel::z) * pixels, pixels);
+    heights_m_.clear();
+    for (const float z : heights) {
+      if (z != 0.0F)
+        heights_m_.push_back(z * statistics_.deviation[index(InputChannel::z)] +
+                             statistics_.mean[index(InputChannel::z)]);
+    }
+    std::ranges::sort(heights_m_);
+    return {.output = std::vector<std::uint8_t>(pixels, 9),
+            .confidence = std::vector(pixels, 1.0F)};
+  }
+  std::vector<float> probabilities(std::span<const float> /*input*/) override { return {}; }
+  [[nodiscard]] std::string engine() const override { return "keeps heights"; }
+
+ private:
+  InputStatistics statistics_;
+  std::vector<float>& heights_m_;
+};
+
+TEST(NetworkSegmenterOfAnUntoldMount, ShowsTheGroundLevelAndAsDeepAsUsual) {
+  ModelDescription model = test::describe_family(64, 512, 20);
+  model.follow_sensor = true;
+  model.lidar_height_m = 1.7;
+  std::vector<float> heights_m;
+  NetworkSegmenter labels(model, std::make_unique<KeepsHeights>(model.statistics, heights_m));
+  const auto shows_level_ground = [&](const Scan& scan) {
+    static_cast<void>(labels.segment(scan));
+    // Ground takes up most of the image: its tenth and its middle are as high.
+    return std::abs(heights_m[heights_m.size() / 50] + 1.7F) < 0.1F &&
+           std::abs(heights_m[heights_m.size() / 3] + 1.7F) < 0.1F;
+  };
+  Scan scan;
+  for (const double pitch_deg : {0.0, 6.0, 12.0}) {
+    scan.points_lidar = Court{.R_world_lidar = leaning(0.0, pitch_deg)}.scan();
+    EXPECT_TRUE(shows_level_ground(scan)) << pitch_deg;
+  }
+  scan.points_lidar = Court{.height_m = 0.9}.scan();
+  EXPECT_TRUE(shows_level_ground(scan)) << "a low lidar";
+  scan.points_lidar = Court{}.scan();
+  for (Eigen::Vector3f& p : scan.points_lidar) p = leaning(-8.0, 0.0).cast<float>() * p;
+  EXPECT_TRUE(shows_level_ground(scan)) << "a cloud that was turned";
+  labels.set_mount(Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, 1.7)));
+  EXPECT_FALSE(shows_level_ground(scan)) << "what is told is believed";
+}
+
+}  // namespace
+}  // namespace stillmap
