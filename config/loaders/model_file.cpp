@@ -100,6 +100,19 @@ void read_voxel_votes(YamlSection section, std::optional<VoxelVoteConfig>& votes
   if (use) votes = read;
 }
 
+void read_unsure_votes(YamlSection section, std::optional<UnsureVoteConfig>& votes) {
+  bool use = true;
+  UnsureVoteConfig read;
+  section.boolean("use", use);
+  section.number("edge_m", read.edge_m, {0.05, 10});
+  section.number("height_m", read.height_m, {0.05, 10});
+  section.number("neighbour_weight", read.neighbour_weight, {0, 1});
+  section.number("unsure_below", read.unsure_below, {0, 1});
+  section.number("unsure_small_below", read.unsure_small_below, {0, 1});
+  section.number("small_weight", read.small_weight, {1e-3, 1e3});
+  if (use) votes = read;
+}
+
 std::optional<TrainedSensors> read_trained_for(YamlSection section) {
   TrainedSensors seen;
   section.require({"min_beams", "max_beams", "fov_up_deg", "fov_down_deg"});
@@ -129,6 +142,12 @@ void read_model(YamlSection file, ModelDescription& model) {
   read_classes(file.section("classes"), model.classes);
   read_knn(file.section("knn"), model.knn);
   if (file.has("voxel_votes")) read_voxel_votes(file.section("voxel_votes"), model.voxel_votes);
+  if (file.has("unsure_votes")) {
+    read_unsure_votes(file.section("unsure_votes"), model.unsure_votes);
+  } else if (model.voxel_votes) {
+    // As models had it that could not say.
+    model.unsure_votes = UnsureVoteConfig{};
+  }
   if (model.fov_up <= model.fov_down) file.fault("image", "fov_down_deg must be below fov_up_deg");
 }
 

@@ -123,6 +123,7 @@ std::string ModelDescription::faults() const {
   }
   if (knn) faults += knn->faults();
   if (voxel_votes) faults += voxel_votes->faults();
+  if (unsure_votes) faults += unsure_votes->faults();
   return faults;
 }
 

@@ -90,8 +90,10 @@ struct ModelDescription {
   std::vector<SemanticClass> classes;
   /// Without it a point takes the class of its pixel.
   std::optional<KnnConfig> knn;
-  /// Without it that class is final.
+  /// Points vote once more in space, all of them and then those that are unsure; without either
+  /// these votes do not take place.
   std::optional<VoxelVoteConfig> voxel_votes;
+  std::optional<UnsureVoteConfig> unsure_votes;
   /// Leaves the scan's point 0 out of the image, as lidar-bonnetal's mask does. For parity tests.
   bool mask_first_point = false;
   /// Without it the network cannot run in 8-bit integers.

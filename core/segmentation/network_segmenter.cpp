@@ -108,6 +108,15 @@ PixelLabels pixel_labels(PixelOutputs&& outputs, const ModelDescription& model) 
   return pixels;
 }
 
+PointLabels voted_labels(const RangeImage& image, const PixelLabels& pixels,
+                         std::span<const Eigen::Vector3f> points, const ModelDescription& model) {
+  PointLabels labels =
+      model.knn ? knn_labels(image, pixels, *model.knn) : labels_of_own_pixel(image, pixels);
+  if (model.voxel_votes) vote_in_voxels(points, *model.voxel_votes, labels);
+  if (model.unsure_votes) vote_where_unsure(points, *model.unsure_votes, labels);
+  return labels;
+}
+
 NetworkSegmenter::NetworkSegmenter(ModelDescription model,
                                    std::unique_ptr<SegmentationNetwork> network, std::string remark)
     : model_(std::move(model)), remark_(std::move(remark)) {
@@ -296,13 +305,7 @@ PointLabels NetworkSegmenter::segment_with(SegmentationNetwork& network, int col
   PixelOutputs outputs = network.run(
       make_network_input(points, scan.intensity, filled ? *filled : image, model_, view.raised_m));
   const PixelLabels pixels = pixel_labels(std::move(outputs), model_);
-  PointLabels labels =
-      model_.knn ? knn_labels(image, pixels, *model_.knn) : labels_of_own_pixel(image, pixels);
-  if (model_.voxel_votes) {
-    vote_in_voxels(points, *model_.voxel_votes, labels);
-    vote_where_unsure(points, {}, labels);
-  }
-  return labels;
+  return voted_labels(image, pixels, points, model_);
 }
 
 namespace {

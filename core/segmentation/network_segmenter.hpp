@@ -20,6 +20,13 @@ namespace stillmap {
 /// The classes of a network's outputs; unlabeled for PixelOutputs::no_output.
 [[nodiscard]] PixelLabels pixel_labels(PixelOutputs&& outputs, const ModelDescription& model);
 
+/// The classes of the points of an image from those of its pixels, by the votes that the model asks
+/// for: of the pixels around a point, then in voxels. `points` are those of the image, along axes
+/// in which the ground is level.
+[[nodiscard]] PointLabels voted_labels(const RangeImage& image, const PixelLabels& pixels,
+                                       std::span<const Eigen::Vector3f> points,
+                                       const ModelDescription& model);
+
 /// Labels from a network on range images (RangeNet++): projection, inference, votes of the
 /// pixels around a point and of the voxels.
 class NetworkSegmenter final : public Segmenter {

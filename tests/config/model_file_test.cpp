@@ -74,6 +74,31 @@ TEST(ModelFile, ReadsVotesInVoxels) {
   EXPECT_THAT(refusal_of(yaml, "0.25", "2"), HasSubstr("voxel_votes.neighbour_weight"));
 }
 
+TEST(ModelFile, ReadsVotesOfThoseWhoAreUnsure) {
+  const std::string voxels = sound + "voxel_votes: {edge_m: 0.4}\n";
+  const std::string yaml = voxels +
+                           "unsure_votes: {edge_m: 0.6, height_m: 0.2, neighbour_weight: 0.25, "
+                           "unsure_below: 0.3, unsure_small_below: 0.7, small_weight: 0.6}\n";
+  const ModelDescription model = load_model(yaml);
+  ASSERT_TRUE(model.unsure_votes.has_value());
+  EXPECT_EQ(model.unsure_votes->edge_m, 0.6);
+  EXPECT_EQ(model.unsure_votes->height_m, 0.2);
+  EXPECT_EQ(model.unsure_votes->neighbour_weight, 0.25);
+  EXPECT_EQ(model.unsure_votes->unsure_below, 0.3);
+  EXPECT_EQ(model.unsure_votes->unsure_small_below, 0.7);
+  EXPECT_EQ(model.unsure_votes->small_weight, 0.6);
+  EXPECT_THAT(refusal_of(yaml, "edge_m: 0.6", "edge_m: 0"), HasSubstr("unsure_votes.edge_m"));
+  EXPECT_THAT(refusal_of(yaml, "below: 0.3", "below: 3"), HasSubstr("unsure_votes.unsure_below"));
+  EXPECT_THAT(refusal_of(yaml, "small_weight", "small"), HasSubstr("unsure_votes.small"));
+}
+
+TEST(ModelFile, HasVotesOfThoseWhoAreUnsureAfterThoseInVoxelsUnlessItSaysOtherwise) {
+  const std::string voxels = sound + "voxel_votes: {edge_m: 0.4}\n";
+  EXPECT_TRUE(load_model(voxels).unsure_votes.has_value());
+  EXPECT_FALSE(load_model(voxels + "unsure_votes: {use: false}\n").unsure_votes.has_value());
+  EXPECT_FALSE(load_model(sound).unsure_votes.has_value());
+}
+
 TEST(ModelFile, ReadsWhetherTheNetworkTakesTheSlope) {
   EXPECT_EQ(load_model(sound).statistics.channels, 5U);
   std::string yaml = sound;

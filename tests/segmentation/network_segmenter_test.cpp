@@ -118,11 +118,13 @@ TEST(NetworkSegmenter, LetsVoxelsVoteAfterTheImageWhenAsked) {
   for (Eigen::Vector3f& point : scan.points_lidar) point *= 0.1F;
   const PointLabels before = open_model(fixture.model)->segment(scan);
   fixture.model.voxel_votes = VoxelVoteConfig{.edge_m = 0.2, .height_m = 0.2};
-  const PointLabels voted = open_model(fixture.model)->segment(scan);
   PointLabels expected = before;
   vote_in_voxels(scan.points_lidar, *fixture.model.voxel_votes, expected);
   const PointLabels once = expected;
-  vote_where_unsure(scan.points_lidar, {}, expected);
+  EXPECT_EQ(open_model(fixture.model)->segment(scan).classes, once.classes);
+  fixture.model.unsure_votes = UnsureVoteConfig{.edge_m = 0.6};
+  const PointLabels voted = open_model(fixture.model)->segment(scan);
+  vote_where_unsure(scan.points_lidar, *fixture.model.unsure_votes, expected);
   EXPECT_NE(expected.classes, once.classes);
   EXPECT_EQ(voted.classes, expected.classes);
   EXPECT_EQ(voted.confidence, expected.confidence);

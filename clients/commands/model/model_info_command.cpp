@@ -36,6 +36,10 @@ std::string votes_in_words(const ModelDescription& model) {
     words += ", then voxels of " + fixed(model.voxel_votes->edge_m, 2) + " m, " +
              fixed(model.voxel_votes->height_m, 2) + " m high";
   }
+  if (model.unsure_votes) {
+    words += ", then of the unsure in such of " + fixed(model.unsure_votes->edge_m, 2) + " m, " +
+             fixed(model.unsure_votes->height_m, 2) + " m high";
+  }
   return words;
 }
 

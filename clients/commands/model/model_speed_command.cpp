@@ -145,13 +145,7 @@ SegmentationTiming time_segmentation(const ModelDescription& model, const TimedE
   timing.gops = giga_operations / timing.network_ms * 1e3;
   const RangeImage image(scan.points_lidar, model.projection());
   const PixelLabels pixels = pixel_labels(std::move(outputs), model);
-  const KnnConfig knn = model.knn.value_or(KnnConfig{});
-  timing.votes_ms = median_ms([&] {
-    PointLabels labels = knn_labels(image, pixels, knn);
-    if (!model.voxel_votes) return;
-    vote_in_voxels(scan.points_lidar, *model.voxel_votes, labels);
-    vote_where_unsure(scan.points_lidar, {}, labels);
-  });
+  timing.votes_ms = median_ms([&] { (void)voted_labels(image, pixels, scan.points_lidar, model); });
   return timing;
 }
 

@@ -74,6 +74,7 @@ def describe_run(arguments, state):
         config["follow_sensor"],
         # A run from before there were any has none.
         config.get("voxel_votes"),
+        config.get("unsure_votes"),
     )
 
 

@@ -30,12 +30,22 @@ def export_onnx(network, file, shape, free_size):
 
 
 def describe(
-    words, image, mean, deviation, classes, knn, follow_sensor=False, voxel_votes=None
+    words,
+    image,
+    mean,
+    deviation,
+    classes,
+    knn,
+    follow_sensor=False,
+    voxel_votes=None,
+    unsure_votes=None,
 ):
     """The content of model.yaml. `words`: name, licence, sensor, trained_for, lidar_height_m,
     training, accuracy; `classes`: name of the class of each output; `knn`: None, or neighbours, window, sigma,
-    cutoff_m; `voxel_votes`: None, or edge_m, height_m, neighbour_weight, own_weight."""
-    return {
+    cutoff_m; `voxel_votes`: None, or edge_m, height_m, neighbour_weight, own_weight; `unsure_votes`:
+    None (the usual ones after votes in voxels), or edge_m, height_m, neighbour_weight, unsure_below,
+    unsure_small_below, small_weight."""
+    description = {
         **words,
         "image": {**image, "follow_sensor": follow_sensor},
         "statistics": {
@@ -46,6 +56,9 @@ def describe(
         "knn": {"use": knn is not None, **(knn or {})},
         "voxel_votes": {"use": voxel_votes is not None, **(voxel_votes or {})},
     }
+    if unsure_votes is not None:
+        description["unsure_votes"] = {"use": True, **unsure_votes}
+    return description
 
 
 def write_model(folder, network, description):
