@@ -9,7 +9,7 @@ namespace stillmap {
 namespace {
 
 constexpr double inlier_distance_m = 0.2;
-constexpr std::size_t min_points = 12;
+constexpr std::size_t min_fitted_points = 12;
 constexpr int samples = 60;
 constexpr int refinements = 3;
 
@@ -48,7 +48,7 @@ LevelPlane least_squares(const LevelPlane& start, std::span<const Eigen::Vector3
 
 std::optional<LevelPlane> fit_level_plane(std::span<const Eigen::Vector3f> points, double max_slope,
                                           double min_share) {
-  if (points.size() < min_points) return std::nullopt;
+  if (points.size() < min_fitted_points) return std::nullopt;
   std::mt19937 random(1);
   const auto draw = [&] { return points[random() % points.size()].cast<double>().eval(); };
   std::optional<LevelPlane> best;
