@@ -231,7 +231,8 @@ bool LiveTile::clear_seen_through(const VisibilityTest& test, std::uint32_t scan
 }
 
 VoxelHistory LiveTile::history(const LiveVoxel& voxel) {
-  return {voxel.hits, voxel.misses, voxel.was_shown != 0, voxel.is_restored != 0};
+  return {voxel.hits, voxel.misses, voxel.was_shown != 0, voxel.is_restored != 0,
+          voxel.is_thin != 0};
 }
 
 void LiveTile::sort_fresh() {
@@ -397,6 +398,7 @@ void LiveTile::add(const PackedVoxels& known,
     live.misses = std::min(counts.misses, misses_of_rest) & 0x1FFFU;
     live.was_shown = counts.was_shown ? 1 : 0;
     live.is_restored = counts.is_restored ? 1 : 0;
+    live.is_thin = counts.is_thin ? 1 : 0;
   }
 }
 

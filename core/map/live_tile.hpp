@@ -135,7 +135,7 @@ class LiveTile {
     std::uint32_t last_scan = 0;
     std::uint16_t hits = 0;
     std::uint16_t misses : 13 = 0;
-    /// One beam alone hit something thin in it. Not stored.
+    /// One beam alone hit something thin in it.
     std::uint16_t is_thin : 1 = 0;
     std::uint16_t was_shown : 1 = 0;
     std::uint16_t is_restored : 1 = 0;

@@ -20,6 +20,8 @@ struct VoxelHistory {
   std::uint16_t misses = 0;
   bool was_shown = false;
   bool is_restored = false;
+  /// One beam alone hit something thin in it.
+  bool is_thin = false;
   friend bool operator==(const VoxelHistory&, const VoxelHistory&) = default;
 };
 

@@ -123,6 +123,7 @@ void add_to(MergedTile& tile, const MergedVoxel& more) {
   history.misses = misses_of_both(history.misses, more.history.misses);
   history.was_shown |= more.history.was_shown;
   history.is_restored |= more.history.is_restored;
+  history.is_thin |= more.history.is_thin;
 }
 
 /// Calls `take` with every voxel of a tile, whether it is shown or not.

@@ -178,6 +178,32 @@ TEST(LiveTile, OnlyASureClassTakesMoreMissesToClear) {
   EXPECT_FALSE(shown_after(6, SemanticClass::building, 0.9F, 31));
 }
 
+/// Clears what no more than rays beside it tells of.
+TEST(LiveTile, WhatOneBeamAloneHitIsThinInItsRecordToo) {
+  ScanStamps stamps;
+  LiveTile tile(live_id, live_grid);
+  TilePoint bar = point_in(voxel_key({7, 8, 1}));
+  bar.is_thin = true;
+  tile.insert(std::array{bar, point_in(voxel_key({9, 8, 1}))}, stamps.add(5));
+  (void)tile.publish(1, rule, stamps);
+  const TileRecord record = tile.record(rule, stamps);
+  const TileRecord stored{
+      std::make_shared<const Tile>(decode_tile(encode_tile(*record.tile), live_grid)),
+      std::make_shared<const TileEvidence>(
+          decode_evidence(encode_evidence(*record.evidence), live_grid))};
+  LiveTile reloaded(live_id, stored, live_grid, stamps);
+  const VisibilityTest test{
+      .is_free = [](const Eigen::Vector3f&, Thin thin) { return thin == Thin::no; },
+      .times_free_before = {},
+      .last_scan_cleared = 0};
+  for (std::uint32_t miss = 0; miss < 10; ++miss)
+    (void)reloaded.clear_seen_through(test, stamps.add(20 + miss), rule);
+  (void)reloaded.publish(2, rule, stamps);
+  ASSERT_TRUE(reloaded.published());
+  ASSERT_EQ(reloaded.published()->voxels.size(), 1U);
+  EXPECT_EQ(voxel_key(reloaded.published()->voxels[0].index), bar.voxel_key);
+}
+
 TEST(LiveTile, OfAVoxelThatAFileExcludesTooTheVoxelStays) {
   ScanStamps stamps;
   LiveTile tile(live_id, live_grid);

@@ -125,7 +125,8 @@ TEST(TileCodec, RandomBytesAreRefused) {
   for (int i = 0; i < 2000; ++i) {
     std::vector<std::uint8_t> bytes(random() % 200);
     for (auto& byte : bytes) byte = static_cast<std::uint8_t>(random());
-    if (!bytes.empty()) bytes[0] = tile_formats.at(static_cast<std::size_t>(i) % 3);
+    if (!bytes.empty())
+      bytes[0] = tile_formats.at(static_cast<std::size_t>(i) % tile_formats.size());
     EXPECT_THROW((void)decode_tile(bytes, codec_grid), TileCodecError);
   }
 }
@@ -230,7 +231,7 @@ Voxel voxel_at(std::uint16_t x, SemanticClass label) {
 TileEvidence any_evidence() {
   TileEvidence evidence;
   evidence.id = evidence_tile;
-  evidence.shown = {{1, 2, true, false}, {65535, 0, true, true}, {3, 1000, false, false}};
+  evidence.shown = {{1, 2, true, false}, {65535, 0, true, true, true}, {3, 1000, false, false}};
   evidence.hidden =
       PackedVoxels(evidence_tile, codec_grid,
                    std::array{voxel_at(1, SemanticClass::car), voxel_at(2, SemanticClass::fence),
@@ -256,8 +257,22 @@ TEST(TileEvidence, RoundTripLosesNothing) {
   EXPECT_EQ(back.excluded, evidence.excluded);
 }
 
+TEST(TileCodec, OnlyEvidenceOfThinThingsNeedsTheirFormat) {
+  TileEvidence evidence = any_evidence();
+  std::vector<std::uint8_t> bytes = encode_evidence(evidence);
+  EXPECT_EQ(bytes[0], thin_evidence_format);
+  bytes[0] = tile_format;
+  EXPECT_THROW((void)decode_evidence(bytes, codec_grid), TileCodecError);
+  for (VoxelHistory& history : evidence.shown) history.is_thin = false;
+  // As programs read that know no thin things.
+  EXPECT_EQ(encode_evidence(evidence)[0], tile_format);
+  evidence.hidden_states[0].history.is_thin = true;
+  EXPECT_EQ(encode_evidence(evidence)[0], thin_evidence_format);
+}
+
 TEST(TileEvidence, TheSecondFormatIsRead) {
-  const TileEvidence evidence = any_evidence();
+  TileEvidence evidence = any_evidence();
+  for (VoxelHistory& history : evidence.shown) history.is_thin = false;
   constexpr std::size_t header_bytes = 38;
   constexpr std::size_t shown_bytes = 5;
   const std::size_t voxels_at = header_bytes + shown_bytes * evidence.shown.size() +

@@ -94,7 +94,7 @@ constexpr std::size_t excluded_bytes = 2 * 2 + 1 + 1 + 4;
 /// Stands for no reason.
 constexpr std::uint8_t no_reason = 255;
 
-enum Flag : std::uint8_t { was_shown_flag = 1, is_restored_flag = 2 };
+enum Flag : std::uint8_t { was_shown_flag = 1, is_restored_flag = 2, is_thin_flag = 4 };
 
 /// As they are stored: plain numbers.
 struct StoredHistory {
@@ -131,8 +131,9 @@ constexpr auto visit_excluded = [](auto&& visit, auto& excluded) {
 };
 
 StoredHistory to_stored(const VoxelHistory& history) {
-  const int flags =
-      (history.was_shown ? was_shown_flag : 0) | (history.is_restored ? is_restored_flag : 0);
+  const int flags = (history.was_shown ? was_shown_flag : 0) |
+                    (history.is_restored ? is_restored_flag : 0) |
+                    (history.is_thin ? is_thin_flag : 0);
   return {history.hits, history.misses, static_cast<std::uint8_t>(flags)};
 }
 
@@ -142,9 +143,10 @@ StoredHiddenState to_stored(const HiddenState& state) {
 }
 
 VoxelHistory from_stored(const StoredHistory& stored) {
-  if (stored.flags > (was_shown_flag | is_restored_flag)) throw TileCodecError("has unknown flags");
+  if (stored.flags > (was_shown_flag | is_restored_flag | is_thin_flag))
+    throw TileCodecError("has unknown flags");
   return {stored.hits, stored.misses, (stored.flags & was_shown_flag) != 0,
-          (stored.flags & is_restored_flag) != 0};
+          (stored.flags & is_restored_flag) != 0, (stored.flags & is_thin_flag) != 0};
 }
 
 HiddenState from_stored(const StoredHiddenState& stored) {
@@ -226,6 +228,12 @@ FirstVotes first_votes_in(std::span<const std::uint8_t> frame) {
   return frame[0] <= 2 ? FirstVotes::as_they_are : FirstVotes::by_what_lacks;
 }
 
+bool has_thin(const TileEvidence& evidence) {
+  return std::ranges::any_of(evidence.shown, &VoxelHistory::is_thin) ||
+         std::ranges::any_of(evidence.hidden_states,
+                             [](const HiddenState& state) { return state.history.is_thin; });
+}
+
 bool is_first_format(std::span<const std::uint8_t> bytes) {
   return !bytes.empty() && bytes[0] == first_tile_format::format_version;
 }
@@ -290,7 +298,7 @@ std::vector<std::uint8_t> encode_evidence(const TileEvidence& evidence) {
   append_planes<state_bytes>(content, all_to_stored<StoredHiddenState>(evidence.hidden_states),
                              visit_state);
   append_excluded(content, evidence.excluded, excluded_times);
-  return to_frame(tile_format, content);
+  return to_frame(has_thin(evidence) ? thin_evidence_format : tile_format, content);
 }
 
 TileEvidence decode_evidence(std::span<const std::uint8_t> bytes, const VoxelGrid& grid) {
@@ -317,6 +325,9 @@ TileEvidence decode_evidence(std::span<const std::uint8_t> bytes, const VoxelGri
   read_list<state_bytes, StoredHiddenState>(from, header.hidden, evidence.hidden_states,
                                             visit_state);
   evidence.excluded = read_excluded(from, header);
+  // The format is not under the frame's checksum; these flags are.
+  if (has_thin(evidence) && bytes[0] != thin_evidence_format)
+    throw TileCodecError("has unknown flags");
   return evidence;
 }
 

@@ -20,10 +20,14 @@ class TileCodecError : public std::runtime_error {
 /// The grid of a stored map; throws TileCodecError for sizes that no map has.
 [[nodiscard]] VoxelGrid stored_grid(double voxel_size_m, double tile_size_m);
 
-/// The formats that are read, and the last of them is written. No bit that turns makes one of
-/// another: a frame's checksum does not cover its number.
-inline constexpr std::array<std::uint8_t, 3> tile_formats = {1, 2, 4};
-inline constexpr std::uint8_t tile_format = tile_formats.back();
+/// The formats that are read. No bit that turns makes one of another: a frame's checksum does not
+/// cover its number.
+inline constexpr std::array<std::uint8_t, 4> tile_formats = {1, 2, 4, 8};
+/// The format that is written. The last one is the same, and of voxels that one beam alone hit
+/// something thin in, it says so: only evidence that has any is written in it, as programs that do
+/// not know it refuse it.
+inline constexpr std::uint8_t tile_format = 4;
+inline constexpr std::uint8_t thin_evidence_format = tile_formats.back();
 
 /// A tile as bytes, nothing lost: a version byte, then a zstd frame (with checksum) of
 ///   i32 x, i32 y, u64 revision, u64 content_hash, u32 voxel count, f64 voxel size [m], u16 voxels
