@@ -14,6 +14,14 @@ namespace {
 constexpr double max_bare_gap_m = 1.6;
 /// Largest distance of that ground [m].
 constexpr double max_third_direction_m = 2.4;
+/// Ground that was measured so densely before both ends of a gap that what leaves the gap is not
+/// the distance of the rings: cells in a row, and how many of them were seen.
+constexpr int bank_cells = 5;
+constexpr int min_bank_seen = 4;
+/// A gap between them that is longer than this is filled where it is that of a hole, the footprint
+/// of a vehicle, which is no longer in any direction than that [m].
+constexpr double max_strip_m = 0.9;
+constexpr double max_hole_m = 8.0;
 /// Tolerance of the far end from the extrapolated slopes: constant [m] and per metre of gap.
 constexpr double step_m = 0.06;
 constexpr double slope_doubt = 0.01;
@@ -37,13 +45,26 @@ constexpr int min_pit_neighbours = 2;
 struct Direction {
   int dx;
   int dy;
-  [[nodiscard]] double length() const { return dx != 0 && dy != 0 ? std::sqrt(2.0) : 1.0; }
+  [[nodiscard]] double length() const { return std::hypot(dx, dy); }
 };
 
 /// Four lines; the opposite of i is i + 4.
 constexpr std::array<Direction, 8> directions{
     {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
 constexpr std::size_t line_count = 4;
+/// Lines to the end of a hole, at most 18 degrees apart: a strip may run anyhow.
+constexpr std::array<Direction, 12> closing_lines{{{1, 0},
+                                                   {3, 1},
+                                                   {2, 1},
+                                                   {1, 1},
+                                                   {1, 2},
+                                                   {1, 3},
+                                                   {0, 1},
+                                                   {-1, 3},
+                                                   {-1, 2},
+                                                   {-1, 1},
+                                                   {-2, 1},
+                                                   {-3, 1}}};
 
 /// Number of cells to the nearest ground in one direction; 0 without any in reach.
 using Reach = std::int16_t;
@@ -128,6 +149,12 @@ class Holes {
                                                  double slope) const;
   [[nodiscard]] bool has_third_direction(int x, int y, std::size_t direction,
                                          const GroundCell& cell) const;
+  /// Whether the ground was measured densely from an end on.
+  [[nodiscard]] bool is_bank(const End& end, Direction outwards) const;
+  /// Whether the hole round a cell ends within `max_hole_m` whatever line is followed through it.
+  [[nodiscard]] bool is_enclosed(int x, int y) const;
+  /// Cells from a cell of a hole to where that ends; one more than `limit` where it does not.
+  [[nodiscard]] int cells_to_end(int x, int y, Direction d, int limit) const;
 
   const GroundGrid& seen_;
   const ColumnGrid& columns_;
@@ -243,7 +270,38 @@ std::optional<Holes::Line> Holes::line_through(int x, int y, std::size_t directi
   line.cell.label = a->distance_m <= b->distance_m ? a->cell->label : b->cell->label;
   if (line.gap_m > max_bare_gap_m && !has_third_direction(x, y, direction, line.cell))
     return std::nullopt;
+  if (line.gap_m > max_strip_m && is_bank(*a, directions.at(direction)) &&
+      is_bank(*b, directions.at(direction + line_count)) && !is_enclosed(x, y))
+    return std::nullopt;
   return line;
+}
+
+bool Holes::is_bank(const End& end, Direction outwards) const {
+  int seen = 0;
+  for (int i = 0; i < bank_cells; ++i) {
+    const int x = end.x + i * outwards.dx;
+    const int y = end.y + i * outwards.dy;
+    if (seen_.contains(x, y) && seen_(x, y).is_known()) ++seen;
+  }
+  return seen >= min_bank_seen;
+}
+
+int Holes::cells_to_end(int x, int y, Direction d, int limit) const {
+  for (int i = 1; i <= limit; ++i) {
+    const int there_x = x + i * d.dx;
+    const int there_y = y + i * d.dy;
+    if (!seen_.contains(there_x, there_y)) break;
+    if (!columns_(there_x, there_y).empty()) return i;
+  }
+  return limit + 1;
+}
+
+bool Holes::is_enclosed(int x, int y) const {
+  return std::ranges::all_of(closing_lines, [&](const Direction& d) {
+    const int limit = static_cast<int>(max_hole_m / (d.length() * cell_m_));
+    const int ahead = cells_to_end(x, y, d, limit);
+    return ahead + cells_to_end(x, y, {-d.dx, -d.dy}, limit) <= limit;
+  });
 }
 
 bool Holes::has_third_direction(int x, int y, std::size_t direction, const GroundCell& cell) const {

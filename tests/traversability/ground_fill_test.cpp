@@ -209,7 +209,7 @@ TEST(GroundFill, OneReflectionBelowTheGroundIsNoPit) {
   for (const double x_m : {0.0, 1.0}) {  // in the gap, and below the ground at its edge
     VoxelWorld world;
     world.ground(-6, -6, 6, 6, road);
-    world.clear(0.0, -6, 1.0, 6);
+    world.clear(0.0, -2, 1.0, 2);
     world.block(x_m, 0.0, x_m + 0.2, 0.2, -0.9, -0.8, unlabeled);
     const auto view = traversability_of(world.view(), square_robot());
     EXPECT_EQ(surface_at(*view, 0.5, 0.1).ground.origin, GroundOrigin::inferred) << x_m;
