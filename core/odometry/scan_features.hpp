@@ -20,6 +20,8 @@ enum class MovableUse {
   none,
   /// Those that earlier range images have shown parked.
   parked,
+  /// All but those that earlier range images have shown moving.
+  not_moving,
 };
 
 /// A scan that was moved to the middle of its sweep, while it is registered.
@@ -41,7 +43,9 @@ struct ScanInParts {
 };
 
 /// The features that are registered: with semantics none on objects that could move, or (without
-/// earlier range images) those that pass eq. (9). Takes parked objects, too, where few are left.
+/// earlier range images) those that pass eq. (9). Takes parked objects, too, where few are left,
+/// and all that were not seen moving where these are nearly all that stands up, or all of the
+/// ground.
 [[nodiscard]] FeatureSets registered_features(ScanInParts& parts, const OdometryConfig& config);
 
 /// Those that enter the local map, without points that move. Edges, planes and points alone.

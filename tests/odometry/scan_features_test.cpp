@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 
 namespace stillmap {
@@ -66,6 +67,39 @@ TEST(RegisteredFeatures, LeaveOutWhatCouldMoveUnlessLittleIsLeft) {
   OdometryConfig none;
   none.weighting = Weighting::none;
   EXPECT_EQ(registered_features(enough.parts, none).surfaces.size(), 200U);
+}
+
+TEST(RegisteredFeatures, TakeAllThatWasNotSeenMovingWhereNearlyAllThatStandsUpCouldMove) {
+  LabelledPoints points(200, 16);
+  for (std::uint32_t i = 0; i < 200; ++i) points.parts.features.upright_points.push_back(i);
+  points.parts.motion_classes[2] = MotionClass::moving;
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 190U);
+  EXPECT_EQ(
+      map_features(points.parts, std::vector<Motion>(200, Motion::stationary), {}).planes.size(),
+      190U);
+}
+
+TEST(RegisteredFeatures, LeaveOutWhatCouldMoveWhereOthersStandBesideIt) {
+  LabelledPoints points(200, 10);
+  for (std::uint32_t i = 0; i < 200; ++i) points.parts.features.upright_points.push_back(i);
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 100U);
+  // What was seen moving is no reason to take what else could move.
+  for (std::size_t k = 0; k < 8; ++k) points.parts.motion_classes[k] = MotionClass::moving;
+  points.labels.classes.assign(200, SemanticClass::building);
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 100U);
+}
+
+TEST(RegisteredFeatures, DoNotCountTheGroundUnderCarsAsStandingUp) {
+  LabelledPoints points(200, 10);
+  for (std::uint32_t i = 0; i < 200; ++i) points.parts.features.upright_points.push_back(i);
+  std::fill(points.labels.classes.begin() + 110, points.labels.classes.end(), SemanticClass::road);
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 200U);
+}
+
+TEST(RegisteredFeatures, TakeTheRoadWhereLabelsSayThatItCouldMove) {
+  LabelledPoints points(200, 10);
+  for (std::uint32_t i = 0; i < 110; ++i) points.parts.features.level_points.push_back(i);
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 200U);
 }
 
 TEST(RegisteredFeatures, TakeObjectsThatAreTallerThanAnyVehicle) {
