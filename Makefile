@@ -70,9 +70,9 @@ web-packages:
 demo: programs ## Run the main job: simulated city, replay over DDS, server, planning client
 	BUILD=$(BUILD) clients/demo.sh
 
-# Two slots a core, of which tests that mostly wait take one (tests/CMakeLists.txt).
+# Four slots a core, of which tests that mostly wait take one (tests/CMakeLists.txt).
 test: build ## Build and run the tests
-	ctest --preset $(PRESET) -j $$((2 * $(JOBS)))
+	ctest --preset $(PRESET) -j $$((4 * $(JOBS)))
 
 test-web: packaged web ## The gateway with Foxglove's own client, and the page in headless Chromium
 	@command -v chromium > /dev/null || $(MAKE) web-packages WEB_PACKAGES=chromium
