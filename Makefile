@@ -71,7 +71,8 @@ demo: programs ## Run the main job: simulated city, replay over DDS, server, pla
 	BUILD=$(BUILD) clients/demo.sh
 
 # Four slots a core, of which tests that mostly wait take one (tests/CMakeLists.txt).
-test: build ## Build and run the tests
+test: configure ## Build and run the tests
+	cmake --build --preset $(PRESET) -j $(JOBS) --target tested
 	ctest --preset $(PRESET) -j $$((4 * $(JOBS)))
 
 test-web: packaged web ## The gateway with Foxglove's own client, and the page in headless Chromium
