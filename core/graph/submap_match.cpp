@@ -59,7 +59,11 @@ std::optional<SubmapMatch> match_submaps(const PlacedSubmap& a, const PlacedSubm
   if (!offset_m) return std::nullopt;
 
   const SubmapTarget target(a.submap);
-  const Eigen::Isometry3d T_a_b_guess = in_space(aligned.best.T_a_b, *offset_m);
+  const double expected_z_m = T_a_b_expected.translation().z();
+  const bool is_of_other_level =
+      window.has_levels && std::abs(*offset_m - expected_z_m) > window.reach_height_m;
+  const double guess_z_m = is_of_other_level ? expected_z_m : *offset_m;
+  const Eigen::Isometry3d T_a_b_guess = in_space(aligned.best.T_a_b, guess_z_m);
   const OdometryResult found = target.register_submap(b.submap, T_a_b_guess);
   SubmapMatch match{
       .T_a_b = found.T_map_lidar,
@@ -72,7 +76,7 @@ std::optional<SubmapMatch> match_submaps(const PlacedSubmap& a, const PlacedSubm
       .refusal = fault_of(found, config)};
   if (!match.refusal.empty()) return match;
 
-  const double height_m = found.T_map_lidar.translation().z() - T_a_b_expected.translation().z();
+  const double height_m = found.T_map_lidar.translation().z() - expected_z_m;
   if (std::abs(height_m) > window.reach_height_m) {
     match.refusal = "it is higher or lower than odometry can have drifted: another storey";
     return match;
@@ -83,7 +87,7 @@ std::optional<SubmapMatch> match_submaps(const PlacedSubmap& a, const PlacedSubm
     match.refusal = "registration left the place that the plan showed";
   } else if (match.runner_up > config.max_runner_up) {
     const OdometryResult other =
-        target.register_submap(b.submap, in_space(aligned.runner_up.T_a_b, *offset_m));
+        target.register_submap(b.submap, in_space(aligned.runner_up.T_a_b, guess_z_m));
     const double away_m =
         (other.T_map_lidar.translation() - found.T_map_lidar.translation()).norm();
     if (other.health != OdometryHealth::lost && away_m > same_pose_m &&

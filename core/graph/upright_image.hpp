@@ -58,6 +58,9 @@ struct AlignmentWindow {
   double reach_rad = 0.05;
   /// In height: beyond it the place that looks alike is another storey.
   double reach_height_m = 2.5;
+  /// There may be other levels above and below the place: the lowest ground says nothing where it
+  /// is beyond the reach in height.
+  bool has_levels = false;
 };
 
 /// Where one submap lies in another, in plan.

@@ -11,6 +11,9 @@
 namespace stillmap {
 namespace {
 
+constexpr const char* alone = "no second closure agreed with its jump";
+constexpr const char* other_level = "it may be a level above or below: too little way agreed";
+
 double angle_of(const Eigen::Isometry3d& T) { return so3_log(T.linear()).norm(); }
 
 /// Along the drive, between nodes [m].
@@ -134,17 +137,34 @@ bool MapAligner::confirm(const LoopCloser& drive, const Found& a, const Found& b
          angle_of(off) < config_.second_agreement_rad;
 }
 
+bool MapAligner::are_enough(const std::vector<Found>& agreeing, const Found& found) const {
+  if (!leads_to_other_level(found)) return true;
+  const auto place = [](const Found& one) -> Eigen::Vector2d {
+    return one.anchor.T_map_node.translation().head<2>();
+  };
+  return std::ranges::any_of(agreeing, [&](const Found& other) {
+    return (place(other) - place(found)).norm() >= config_.level_extent_m;
+  });
+}
+
 std::vector<MapAligner::Found> MapAligner::close(const LoopCloser& drive,
                                                  std::vector<Anchor> anchors,
                                                  MapAlignment& alignment) const {
   std::vector<Found> accepted;
-  // The last one that jumped, which waits for another one.
+  // The last ones that jumped, and agree, which wait for another one.
   std::vector<Found> waiting;
   const auto refuse = [&](Found& found, const char* why) {
     if (why != nullptr) found.closure.refusal = why;
     alignment.refused.push_back(found.closure);
   };
-  constexpr const char* alone = "no second closure agreed with its jump";
+  const auto refuse_waiting = [&] {
+    for (Found& other : waiting) refuse(other, leads_to_other_level(other) ? other_level : alone);
+    waiting.clear();
+  };
+  const auto accept = [&](Found found) {
+    anchors.push_back(found.anchor);
+    accepted.push_back(std::move(found));
+  };
   std::vector<std::size_t> open(drive.submaps().size());
   std::iota(open.begin(), open.end(), std::size_t{0});
   while (!open.empty()) {
@@ -155,22 +175,17 @@ std::vector<MapAligner::Found> MapAligner::close(const LoopCloser& drive,
       refuse(*found, nullptr);
       continue;
     }
-    const bool jumps = found->closure.jump_m > config_.max_single_jump_m;
-    const bool is_confirmed = !waiting.empty() && confirm(drive, *found, waiting.front());
-    if (jumps && !is_confirmed) {
-      for (Found& other : waiting) refuse(other, alone);
-      waiting.assign(1, *std::move(found));
+    const bool agrees = !waiting.empty() && confirm(drive, *found, waiting.front());
+    if (jumps(*found) && !(agrees && are_enough(waiting, *found))) {
+      if (!agrees) refuse_waiting();
+      waiting.push_back(*std::move(found));
       continue;
     }
-    if (is_confirmed) {
-      anchors.push_back(waiting.front().anchor);
-      accepted.push_back(std::move(waiting.front()));
-      waiting.clear();
-    }
-    anchors.push_back(found->anchor);
-    accepted.push_back(*std::move(found));
+    if (agrees)
+      for (Found& other : std::exchange(waiting, {})) accept(std::move(other));
+    accept(*std::move(found));
   }
-  for (Found& other : waiting) refuse(other, alone);
+  refuse_waiting();
   return accepted;
 }
 
@@ -195,7 +210,8 @@ std::optional<MapAligner::Found> MapAligner::match(const LoopCloser& drive, std:
                         .to = node + 1,
                         .T_from_to = found->T_map_key,
                         .information = found->match.key_information,
-                        .is_loop = true}};
+                        .is_loop = true},
+               .height_jump_m = (found->T_map_key.translation() - T_map_key.translation()).z()};
 }
 
 MapAligner::Solution MapAligner::solve(const LoopCloser& drive, const std::vector<Found>& closures,

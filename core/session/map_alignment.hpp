@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -37,6 +38,10 @@ struct MapAlignmentConfig {
   double max_single_jump_m = 1.0;
   double second_agreement_m = 0.6;
   double second_agreement_rad = 0.02;
+  /// One that is higher or lower than this needs some that agree with it on so much of the plan:
+  /// see LoopClosingConfig [m].
+  double max_height_jump_m = 1.0;
+  double level_extent_m = 80.0;
   /// The drive lies in the map when so many of its submaps do.
   std::size_t min_closures = 2;
   /// The graph may deny this share of the closures; where it denies more, odometry is trusted less.
@@ -109,6 +114,8 @@ class MapAligner {
     MapClosure closure;
     Anchor anchor;
     PoseEdge edge;
+    /// How much higher it is than where it was expected [m].
+    double height_jump_m = 0.0;
   };
   /// Those that agree; none where these are too few, or as many say something else.
   [[nodiscard]] std::vector<Anchor> localize(const LoopCloser& drive, const ScanSource& scan_at,
@@ -130,6 +137,14 @@ class MapAligner {
   [[nodiscard]] static NextSubmap take_nearest(const LoopCloser& drive,
                                                const std::vector<Anchor>& anchors,
                                                std::vector<std::size_t>& open);
+  [[nodiscard]] bool jumps(const Found& found) const {
+    return found.closure.jump_m > config_.max_single_jump_m;
+  }
+  [[nodiscard]] bool leads_to_other_level(const Found& found) const {
+    return std::abs(found.height_jump_m) > config_.max_height_jump_m;
+  }
+  /// Whether it and those that agree with it are enough to be believed.
+  [[nodiscard]] bool are_enough(const std::vector<Found>& agreeing, const Found& found) const;
   /// Whether both put the drive at the same place.
   [[nodiscard]] bool confirm(const LoopCloser& drive, const Found& a, const Found& b) const;
   [[nodiscard]] std::optional<Found> match(const LoopCloser& drive, std::size_t submap,

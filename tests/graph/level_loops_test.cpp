@@ -1,81 +1,20 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <random>
 #include <vector>
 
 #include "core/graph/loop_closer.hpp"
+#include "tests/graph/level_worlds.hpp"
 
 namespace stillmap {
 namespace {
 
-constexpr double rad_per_deg = std::numbers::pi / 180.0;
-constexpr double lidar_height_m = 1.8;
-constexpr double max_range_m = 60.0;
-
-struct Box {
-  Eigen::Vector3d low, high;
-};
-
-/// Boxes that a lidar of 24 rings sees.
-class BoxWorld {
- public:
-  void add(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
-    boxes_.push_back({low, high});
-  }
-
-  [[nodiscard]] LabelledScan scan_at(const Eigen::Isometry3d& T_map_lidar,
-                                     std::uint64_t seed) const {
-    std::mt19937_64 random(seed);
-    std::normal_distribution<double> noise_m(0.0, 0.01);
-    LabelledScan scan;
-    for (int ring = 0; ring < 24; ++ring) {
-      const double elevation = (15.0 - 40.0 * ring / 23.0) * rad_per_deg;
-      for (int k = 0; k < 360; ++k) {
-        const double azimuth = 1.0 * k * rad_per_deg;
-        const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
-                                  std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
-        const double range_m = range(T_map_lidar.translation(), T_map_lidar.linear() * ray);
-        if (range_m > max_range_m) continue;
-        scan.scan.points_lidar.push_back(((range_m + noise_m(random)) * ray).cast<float>());
-      }
-    }
-    scan.motion.assign(scan.scan.size(), Motion::stationary);
-    return scan;
-  }
-
- private:
-  [[nodiscard]] double range(const Eigen::Vector3d& from, const Eigen::Vector3d& ray) const {
-    double nearest = std::numeric_limits<double>::infinity();
-    for (const Box& box : boxes_) {
-      const Eigen::Array3d a = (box.low - from).array() / ray.array();
-      const Eigen::Array3d b = (box.high - from).array() / ray.array();
-      const double enter = a.min(b).maxCoeff();
-      const double leave = a.max(b).minCoeff();
-      if (enter > 0.0 && enter < leave) nearest = std::min(nearest, enter);
-    }
-    return nearest;
-  }
-
-  std::vector<Box> boxes_;
-};
-
-/// Two poses a metre apart, along a straight way that may climb.
-void drive(std::vector<Eigen::Isometry3d>& poses, const Eigen::Vector3d& from,
-           const Eigen::Vector3d& to) {
-  const Eigen::Vector3d way = to - from;
-  const int steps = static_cast<int>(way.norm());
-  const Eigen::AngleAxisd heading(std::atan2(way.y(), way.x()) + 0.003, Eigen::Vector3d::UnitZ());
-  const Eigen::AngleAxisd pitch(-std::atan2(way.z(), way.head<2>().norm()),
-                                Eigen::Vector3d::UnitY());
-  for (int k = 0; k <= steps; ++k)
-    poses.push_back(
-        Eigen::Translation3d(from + way * k / steps + Eigen::Vector3d(0.01, 0.01, lidar_height_m)) *
-        heading * pitch);
-}
+using levels::BoxWorld;
+using levels::bridge_world;
+using levels::car_park;
+using levels::drive;
+using levels::drive_away;
+using levels::drive_round;
 
 /// Closures of a drive by odometry without drift, and how far off the worst of them is.
 struct Closures {
@@ -98,50 +37,6 @@ Closures closures_of(const BoxWorld& world, const std::vector<Eigen::Isometry3d>
   return found;
 }
 
-/// A street along x, and one along y that leads over it by a bridge.
-BoxWorld bridge_world(std::uint64_t seed, double deck_m) {
-  BoxWorld world;
-  world.add({-150, -150, -1}, {150, 150, 0});
-  // Ramps in steps of a metre, and the deck.
-  for (int y = -70; y < 70; ++y) {
-    const double away_m = std::max(0.0, std::abs(y + 0.5) - 14.0);
-    const double top_m = deck_m - 0.07 * away_m;
-    if (top_m < 0.05) continue;
-    const double y0 = y;
-    world.add({-5.0, y0, top_m - 0.8}, {5.0, y0 + 1.0, top_m});
-    for (const double x : {-5.0, 4.8}) world.add({x, y0, top_m}, {x + 0.2, y0 + 1.0, top_m + 0.9});
-    if (top_m < 2.5) world.add({-5.0, y0, 0}, {5.0, y0 + 1.0, top_m - 0.8});
-  }
-  std::mt19937_64 random(seed);
-  std::uniform_real_distribution<double> share(0.0, 1.0);
-  // Houses along both, but for the crossing.
-  for (const double side : {-1.0, 1.0}) {
-    for (const double end : {-1.0, 1.0}) {
-      for (double w = 15.0; w < 90.0;) {
-        const double width_m = 9.0 + 12.0 * share(random);
-        const double face_m = 11.0 + 2.0 * share(random);
-        const double high_m = 9.0 + 8.0 * share(random);
-        const auto box = [&](bool along_x) {
-          const Eigen::Vector2d a(end * w, side * face_m);
-          const Eigen::Vector2d b(end * (w + width_m - 1.0), side * (face_m + 8.0));
-          Eigen::Vector2d low = a.cwiseMin(b);
-          Eigen::Vector2d high = a.cwiseMax(b);
-          if (!along_x) std::swap(low.x(), low.y()), std::swap(high.x(), high.y());
-          world.add({low.x(), low.y(), 0}, {high.x(), high.y(), high_m});
-        };
-        if (w > 24.0 || face_m < 24.0) box(true), box(false);
-        w += width_m;
-      }
-    }
-  }
-  return world;
-}
-
-/// A stretch so far away that odometry may have drifted by a level until the lidar comes back.
-void drive_away(std::vector<Eigen::Isometry3d>& poses, double there_m) {
-  poses.push_back(Eigen::Translation3d(0, there_m, 0) * Eigen::Isometry3d::Identity());
-}
-
 TEST(LoopsOnLevels, ABridgeIsNotTheStreetThatLeadsUnderIt) {
   constexpr double deck_m = 5.5;
   constexpr double low_m = deck_m - 0.07 * 46.0;
@@ -153,50 +48,6 @@ TEST(LoopsOnLevels, ABridgeIsNotTheStreetThatLeadsUnderIt) {
   drive(poses, {0, -13, deck_m}, {0, 14, deck_m});
   drive(poses, {0, 15, deck_m}, {0, 60, low_m});
   EXPECT_LT(closures_of(world, poses).worst_m, 0.3);
-}
-
-/// Storeys of the same walls, pillars and stairs, with other cars on each; houses round them.
-BoxWorld car_park(std::uint64_t seed, int storeys) {
-  BoxWorld world;
-  const double length_m = 60.0, width_m = 34.0, storey_m = 3.0;
-  world.add({-60, -60, -1}, {120, 90, -0.3});
-  for (int s = 0; s <= storeys; ++s) {
-    const double z = s * storey_m;
-    world.add({0, 0, z - 0.3}, {length_m, width_m, z});
-    if (s == storeys) break;
-    world.add({-0.2, 0, z}, {0, width_m, z + 1.1});
-    world.add({length_m, 0, z}, {length_m + 0.2, width_m, z + 1.1});
-    world.add({0, -0.2, z}, {length_m, 0, z + 1.1});
-    world.add({0, width_m, z}, {length_m, width_m + 0.2, z + 1.1});
-    std::mt19937_64 random(seed + static_cast<std::uint64_t>(s));
-    std::uniform_real_distribution<double> share(0.0, 1.0);
-    for (int k = 0; k < 24; ++k) {
-      const double x = 2.0 + share(random) * (length_m - 8.0);
-      const double y = k % 3 == 0   ? 0.4 + share(random)
-                       : k % 3 == 1 ? width_m - 2.5 + share(random)
-                                    : 15.0 + 2.0 * share(random);
-      world.add({x, y, z}, {x + 4.2, y + 1.7, z + 1.5});
-    }
-  }
-  for (double x = 7.0; x < length_m; x += 10.0)
-    for (const double y : {11.0, 23.0})
-      world.add({x, y, 0}, {x + 0.4, y + 0.4, storeys * storey_m});
-  world.add({28, 12, 0}, {34, 16, storeys * storey_m});
-  // Houses around, seen over the parapets.
-  world.add({-25, -12, 0}, {-14, 9, 12});
-  world.add({8, -26, 0}, {20, -14, 14});
-  world.add({29, -23, 0}, {44, -15, 16});
-  world.add({74, 2, 0}, {82, 21, 15});
-  world.add({3, 47, 0}, {16, 58, 13});
-  world.add({26, 44, 0}, {41, 50, 16});
-  return world;
-}
-
-void drive_round(std::vector<Eigen::Isometry3d>& poses, double z) {
-  drive(poses, {6, 7, z}, {54, 7, z});
-  drive(poses, {54, 8, z}, {54, 27, z});
-  drive(poses, {53, 27, z}, {6, 27, z});
-  drive(poses, {6, 26, z}, {6, 8, z});
 }
 
 TEST(LoopsOnLevels, StoreysOfACarParkAreNotOneAnother) {

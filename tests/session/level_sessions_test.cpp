@@ -1,0 +1,84 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "core/map/static_map.hpp"
+#include "core/map/storage/map_file.hpp"
+#include "core/session/map_alignment.hpp"
+#include "tests/graph/level_worlds.hpp"
+#include "tests/session/street_maps.hpp"
+
+namespace stillmap {
+namespace {
+
+using Poses = std::vector<Eigen::Isometry3d>;
+
+SavedMap map_of(const levels::BoxWorld& world, const Poses& poses) {
+  StaticMap map{StaticMapConfig{}};
+  map.reset(1);
+  Trajectory path;
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    LabelledScan scan = world.scan_at(poses[k], k + 1);
+    scan.scan.stamp_ns = static_cast<std::int64_t>(k + 1) * 1'000'000'000;
+    map.insert(scan, poses[k]);
+    path.push_back({scan.scan.stamp_ns, poses[k]});
+  }
+  SavedMap saved = to_saved_map(map.checkpoint(CheckpointScope::everything));
+  saved.trajectory = path;
+  return saved;
+}
+
+/// By odometry without drift.
+MapAlignment alignment_of(const levels::BoxWorld& world, const Poses& poses, const SavedMap& map) {
+  const auto scan_at = [&](std::size_t k) { return world.scan_at(poses[k], 5000 + k); };
+  LoopCloser drive{LoopClosingConfig{}};
+  for (std::size_t k = 0; k < poses.size(); ++k) drive.add(scan_at(k), poses[k], true);
+  drive.finish();
+  return MapAligner(index_of(map)).align(drive, scan_at, Eigen::Matrix3d::Identity());
+}
+
+double worst_m(const MapAlignment& alignment, const Poses& poses) {
+  double worst = 0.0;
+  for (std::size_t k = 0; k < alignment.T_map_lidar.size(); ++k)
+    worst = std::max(worst, (poses[k].inverse() * alignment.T_map_lidar[k]).translation().norm());
+  return worst;
+}
+
+/// Storeys are alike, and odometry may have drifted by one on the way.
+TEST(SessionsOnLevels, AStoreyThatTheMapDoesNotHoldIsNotTheOneBelow) {
+  const levels::BoxWorld world = levels::car_park(4, 2);
+  Poses first, second;
+  levels::drive_round(first, 0.0);
+  levels::drive_round(second, 0.0);
+  levels::drive_away(second, 500);
+  levels::drive_round(second, 3.0);
+  const MapAlignment alignment = alignment_of(world, second, map_of(world, first));
+  ASSERT_TRUE(alignment.is_recognized()) << alignment.in_words();
+  EXPECT_GE(alignment.closures.size(), 4U);
+  for (const MapClosure& closure : alignment.closures)
+    EXPECT_LT((second[closure.scan].inverse() * closure.T_map_lidar).translation().norm(), 0.3)
+        << closure.scan;
+  EXPECT_LT(worst_m(alignment, second), 0.3);
+}
+
+TEST(SessionsOnLevels, OfAMapOfSeveralStoreysEachIsFound) {
+  const levels::BoxWorld world = levels::car_park(4, 2);
+  Poses first;
+  levels::drive_round(first, 0.0);
+  levels::drive_round(first, 3.0);
+  const SavedMap map = map_of(world, first);
+  for (const double storey_m : {0.0, 3.0}) {
+    Poses second;
+    levels::drive_round(second, storey_m);
+    const MapAlignment alignment = alignment_of(world, second, map);
+    ASSERT_TRUE(alignment.is_recognized()) << storey_m << ": " << alignment.in_words();
+    EXPECT_GE(alignment.closures.size(), 4U);
+    EXPECT_LT(worst_m(alignment, second), 0.3);
+  }
+}
+
+}  // namespace
+}  // namespace stillmap
