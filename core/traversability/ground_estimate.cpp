@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace stillmap {
@@ -21,6 +22,16 @@ constexpr float unlabelled_off_m = 0.5F;
 /// Thickness of a surface above its lowest voxel [m].
 constexpr float labelled_run_m = 0.30F;
 constexpr float unlabelled_run_m = 0.15F;
+/// Height of what stands up, and largest distance of the voxels that make it up [m].
+constexpr float standing_m = 0.5F;
+constexpr float standing_gap_m = 0.45F;
+/// What goes on from ground is ground, however far from the level: farthest neighbour [cells], and
+/// largest difference of the heights: constant [m] and per metre.
+constexpr int going_on_cells = 2;
+constexpr float going_on_m = 0.04F;
+constexpr float going_on_slope = 0.35F;
+/// Neighbours that it goes on from.
+constexpr int min_going_on = 5;
 /// Largest deviation of ground from the median of its neighbours [m].
 constexpr float outlier_m = 0.4F;
 
@@ -35,6 +46,17 @@ const ColumnVoxel* lowest_candidate(Column column) {
   if (ground != column.end()) return &*ground;
   if (!column.empty() && is_unlabelled_voxel(column.front())) return &column.front();
   return nullptr;
+}
+
+/// Whether an unlabelled column stands up from its lowest voxel, as a wall or a post does. That
+/// voxel then holds the foot of it beside the ground, and lies higher than the ground.
+bool stands_up(Column column) {
+  float top_m = column.front().height_m;
+  for (const ColumnVoxel& voxel : column.subspan(1)) {
+    if (voxel.height_m - top_m > standing_gap_m) break;
+    top_m = voxel.height_m;
+  }
+  return top_m - column.front().height_m > standing_m;
 }
 
 float low_percentile(std::vector<float>& heights_m) {
@@ -95,6 +117,13 @@ GroundCell surface_from(Column column, std::size_t first, float run_m, const Bel
   return cell;
 }
 
+/// The surface of an unlabelled column that is ground if it goes on from ground beside it.
+GroundCell unlabelled_surface(Column column) {
+  if (column.empty() || !is_unlabelled_voxel(column.front()) || stands_up(column)) return {};
+  if (std::ranges::any_of(column, is_ground_voxel)) return {};
+  return surface_from(column, 0, unlabelled_run_m, is_unlabelled_voxel);
+}
+
 GroundCell ground_of(Column column, float level_m) {
   for (std::size_t i = 0; i < column.size(); ++i) {
     if (!is_ground_voxel(column[i])) continue;
@@ -105,6 +134,7 @@ GroundCell ground_of(Column column, float level_m) {
   }
   if (column.empty() || !is_unlabelled_voxel(column.front())) return {};
   if (!(std::abs(column.front().height_m - level_m) <= unlabelled_off_m)) return {};
+  if (stands_up(column)) return {};
   return surface_from(column, 0, unlabelled_run_m, is_unlabelled_voxel);
 }
 
@@ -156,6 +186,50 @@ SemanticClass smoothed_label(const GroundGrid& ground, int x0, int y0) {
   return winner;
 }
 
+/// Ground round a cell that `surface` goes on from.
+int going_on_from(const GroundGrid& ground, int x0, int y0, const GroundCell& surface,
+                  double cell_m) {
+  int count = 0;
+  for (int dy = -going_on_cells; dy <= going_on_cells; ++dy) {
+    for (int dx = -going_on_cells; dx <= going_on_cells; ++dx) {
+      if (!ground.contains(x0 + dx, y0 + dy)) continue;
+      const GroundCell& beside = ground(x0 + dx, y0 + dy);
+      if (beside.origin != GroundOrigin::seen) continue;
+      const float off_m = std::abs(surface.height_m - beside.height_m);
+      const auto distance_m = static_cast<float>(cell_m * std::sqrt(dx * dx + dy * dy));
+      if (off_m <= going_on_m + going_on_slope * distance_m) ++count;
+    }
+  }
+  return count;
+}
+
+/// Adds unlabelled surfaces that go on from ground, cell by cell: a ramp and where it leads to,
+/// which may be narrower than the level's blocks.
+void add_ground_going_on(GroundGrid& ground, const ColumnGrid& columns, double cell_m) {
+  CellGrid<GroundCell> surfaces(columns.width(), columns.height());
+  std::vector<std::pair<int, int>> open;
+  for_each_cell(columns, [&](int x, int y) {
+    if (ground(x, y).origin == GroundOrigin::seen) return;
+    surfaces(x, y) = unlabelled_surface(columns(x, y));
+    if (surfaces(x, y).origin == GroundOrigin::seen) open.emplace_back(x, y);
+  });
+  while (!open.empty()) {
+    const auto [x, y] = open.back();
+    open.pop_back();
+    if (ground(x, y).origin == GroundOrigin::seen) continue;
+    if (going_on_from(ground, x, y, surfaces(x, y), cell_m) < min_going_on) continue;
+    ground(x, y) = surfaces(x, y);
+    for (int dy = -going_on_cells; dy <= going_on_cells; ++dy) {
+      for (int dx = -going_on_cells; dx <= going_on_cells; ++dx) {
+        if (ground.contains(x + dx, y + dy) &&
+            ground(x + dx, y + dy).origin == GroundOrigin::none &&
+            surfaces(x + dx, y + dy).origin == GroundOrigin::seen)
+          open.emplace_back(x + dx, y + dy);
+      }
+    }
+  }
+}
+
 }  // namespace
 
 GroundLevel::GroundLevel(const ColumnGrid& columns, double cell_m)
@@ -197,12 +271,13 @@ float GroundLevel::at(int x, int y) const {
   return weight > 0.0F ? sum_m / weight : nan;
 }
 
-GroundGrid seen_ground(const ColumnGrid& columns, const GroundLevel& level) {
+GroundGrid seen_ground(const ColumnGrid& columns, const GroundLevel& level, double cell_m) {
   GroundGrid ground(columns.width(), columns.height());
   for_each_cell(columns, [&](int x, int y) {
     if (!columns(x, y).empty()) ground(x, y) = ground_of(columns(x, y), level.at(x, y));
   });
-  const GroundGrid kept = without_outliers(ground);
+  GroundGrid kept = without_outliers(ground);
+  add_ground_going_on(kept, columns, cell_m);
   GroundGrid smoothed = kept;
   for_each_cell(kept, [&](int x, int y) {
     if (kept(x, y).origin == GroundOrigin::seen) smoothed(x, y).label = smoothed_label(kept, x, y);

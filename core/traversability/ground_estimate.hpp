@@ -52,10 +52,12 @@ class GroundLevel {
 
 /// Estimates the ground where it was measured. Voxels of ground classes take precedence: the lowest
 /// of a column within a band around the level, and those directly above it. Unlabelled columns: the
-/// lowest voxel, if it is near the level. Cells far off the median of their neighbours
+/// lowest voxel, if nothing stands up from it as a wall does, and if it is near the level or goes
+/// on from ground beside it as a ramp does. Cells far off the median of their neighbours
 /// (reflections, a car's roof labelled as road) are rejected. One layer only: below a bridge, the
-/// ground is the lower surface.
-[[nodiscard]] GroundGrid seen_ground(const ColumnGrid& columns, const GroundLevel& level);
+/// ground is the lower surface. `cell_m` is the edge of a cell.
+[[nodiscard]] GroundGrid seen_ground(const ColumnGrid& columns, const GroundLevel& level,
+                                     double cell_m);
 
 /// Longest gap that is filled: a parked car with the gaps in front of and behind it [m].
 inline constexpr double max_filled_gap_m = 6.0;

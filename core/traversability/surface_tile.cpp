@@ -14,6 +14,10 @@ namespace {
 
 /// Radius of the plane fit [m].
 constexpr double plane_reach_m = 0.5;
+/// Ground on the far side of what has none is another surface if it lies off by more: height
+/// difference [m] and rise per metre.
+constexpr double apart_m = 0.1;
+constexpr double apart_slope = 0.6;
 /// Ground beyond unknown ground may lie off the slope that leads there by so much: height
 /// difference [m] and rise per metre.
 constexpr double unseen_drop_m = 0.25;
@@ -48,6 +52,21 @@ struct PlaneFit {
   }
 };
 
+/// Whether a known cell at an offset is the ground above or below a wall: steeply off, and with
+/// cells between that are unknown.
+bool is_apart(const GroundGrid& ground, int x, int y, int dx, int dy, double cell_m) {
+  const double rise_m = ground(x + dx, y + dy).height_m - ground(x, y).height_m;
+  if (std::abs(rise_m) <= apart_m + apart_slope * cell_m * std::hypot(dx, dy)) return false;
+  const int cells = std::max(std::abs(dx), std::abs(dy));
+  for (int i = 1; i < cells; ++i) {
+    const double share = static_cast<double>(i) / cells;
+    const int between_x = x + static_cast<int>(std::lround(share * dx));
+    const int between_y = y + static_cast<int>(std::lround(share * dy));
+    if (!ground(between_x, between_y).is_known()) return true;
+  }
+  return false;
+}
+
 PlaneFit plane_around(const GroundGrid& ground, int x0, int y0, double cell_m) {
   const int reach = plane_reach_cells(cell_m);
   const GroundCell& middle = ground(x0, y0);
@@ -57,7 +76,9 @@ PlaneFit plane_around(const GroundGrid& ground, int x0, int y0, double cell_m) {
       const GroundCell& cell = ground(x, y);
       if (!cell.is_known() || cell.label != middle.label) continue;
       // Relative heights, for the precision of the sums.
-      fit.add((x - x0) * cell_m, (y - y0) * cell_m, cell.height_m - middle.height_m);
+      const double rise_m = cell.height_m - middle.height_m;
+      if (std::abs(rise_m) > apart_m && is_apart(ground, x0, y0, x - x0, y - y0, cell_m)) continue;
+      fit.add((x - x0) * cell_m, (y - y0) * cell_m, rise_m);
     }
   }
   return fit;
@@ -143,9 +164,15 @@ double step_beyond_unknown(const GroundGrid& ground, int x, int y, std::pair<int
   const int cells = static_cast<int>(max_filled_gap_m / length_m);
   double step_m = 0.0;
   for (const int sign : {-1, 1}) {
+    const int beside_x = x + sign * d.first;
+    const int beside_y = y + sign * d.second;
+    const bool is_wall = ground.contains(beside_x, beside_y) &&
+                         ground(beside_x, beside_y).origin == GroundOrigin::assumed;
     for (int i = 1; i <= cells; ++i) {
       const auto beyond_m = height_at(ground, x + sign * i * d.first, y + sign * i * d.second);
       if (!beyond_m) continue;
+      // What stands between is in the way of a robot down here; up there the drop is.
+      if (is_wall && *beyond_m > ground(x, y).height_m) break;
       // A slope goes on beyond the gap as it comes to it.
       const auto outwards_m = rise_beyond(ground, x, y, d, -sign);
       const double foreseen_m = outwards_m ? sign * *outwards_m * i : 0.0;
@@ -191,7 +218,8 @@ SurfaceTile make_surface(const TileNeighbourhood<ColumnTile>& columns, double ce
   const ColumnGrid window = columns.window<Column>(margin, {});
   const GroundLevel level(window, cell_m);
   const int border = std::max(0, margin - shape_reach_cells(cell_m));
-  const GroundGrid ground = fill_holes(seen_ground(window, level), window, level, cell_m, border);
+  const GroundGrid ground =
+      fill_holes(seen_ground(window, level, cell_m), window, level, cell_m, border);
   SurfaceTile tile;
   tile.side = columns.side;
   for (int y = margin; y < margin + tile.side; ++y) {
