@@ -93,6 +93,11 @@ std::size_t RangeImageHistory::size() const {
   return views_.size() / static_cast<std::size_t>(config_.range_image_history_interval);
 }
 
+double RangeImageHistory::distance_from_oldest_m(const Eigen::Vector3d& position_map) const {
+  if (size() < static_cast<std::size_t>(config_.range_image_history_size)) return 0.0;
+  return (position_map - views_.front().origin_map().cast<double>()).norm();
+}
+
 PastObservation RangeImageHistory::observation(std::size_t age, const Eigen::Vector3f& point_map,
                                                const RangeImageView& now) const {
   const auto interval = static_cast<std::size_t>(config_.range_image_history_interval);

@@ -42,6 +42,9 @@ class RangeImageHistory {
   void add(RangeImageView view);
   /// Views that can be asked, at most `config.range_image_history_size`.
   [[nodiscard]] std::size_t size() const;
+  /// How far a place is from that of the oldest view that is kept, where there are as many as may
+  /// be; 0 else [m].
+  [[nodiscard]] double distance_from_oldest_m(const Eigen::Vector3d& position_map) const;
 
  private:
   [[nodiscard]] float margin(float range_m) const;

@@ -78,6 +78,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   step.result = doubted_where_pulled(step.result, features, state.map, state.config);
   if (state.fits.are_known())
     step.result = doubted_where_shift_fits(step.result, features, state.map, state.method());
+  state.doubt_what_could_move(parts, step.result);
   state.straighten(features, time_ns, sweep, step.result);
   step.T_map_lidar_middle = step.result.T_map_lidar;
   move_to_middle(scan, sweep, step.result.sweep_correction);

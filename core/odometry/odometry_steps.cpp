@@ -20,6 +20,13 @@ constexpr double max_relocalization_reach_m = 60.0;
 /// Motion is classified again where the pose is farther than this from the predicted one [m, rad].
 constexpr double reclassify_distance_m = 0.2;
 constexpr double reclassify_angle_rad = 0.01;
+/// Parked objects prove that those beside them stand, too, once the lidar has moved so far since
+/// they were seen first [m], and where so large a share of their points is on parked ones.
+constexpr double min_proving_way_m = 0.5;
+constexpr double min_parked_share = 0.05;
+/// Without them the pose would be farther off than this [m, rad]: they may move.
+constexpr double max_disagreement_m = 0.1;
+constexpr double max_disagreement_rad = 0.01;
 /// Points of a ring to either side among which its direction is sought where walls are near: 0.3 m
 /// from one 2 m away, at a fifth of a degree each.
 constexpr std::size_t steps_on_near_walls = 40;
@@ -135,6 +142,7 @@ void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& predi
       },
       [&] { parts.view = view_of(parts.scan, parts.labels, prediction.T_map_lidar); });
   parts.motion_classes = classify(parts, prediction.T_map_lidar);
+  parts.movable = movable;
 }
 
 OdometryResult Odometry::State::find_pose(ScanInParts& parts, const PosePrediction& prediction,
@@ -245,6 +253,27 @@ void Odometry::State::confirm_place(const FeatureSets& features, const PosePredi
   forget_stretch();
 }
 
+void Odometry::State::doubt_what_could_move(const ScanInParts& parts, OdometryResult& result) {
+  if (!started || result.health == OdometryHealth::lost) return;
+  // Seen where they were by a lidar that has moved, which one that is taken along has not.
+  const double moved_m = history.distance_from_oldest_m(result.T_map_lidar.translation());
+  const bool have_proved = moved_m >= min_proving_way_m && parked_share(parts) >= min_parked_share;
+  if (parts.movable != MovableUse::not_moving || have_proved) {
+    is_movable_denied = false;
+    return;
+  }
+  if (result.health != OdometryHealth::good) return;
+  if (!is_movable_denied) {
+    const OdometryResult by_fixed = register_features(
+        fixed_features(parts, config), map, result.T_map_lidar, method(), result.sweep_correction);
+    const PoseTangent off = boxminus(by_fixed.T_map_lidar, result.T_map_lidar);
+    is_movable_denied = by_fixed.health != OdometryHealth::good ||
+                        off.head<3>().norm() > max_disagreement_m ||
+                        off.tail<3>().norm() > max_disagreement_rad;
+  }
+  if (is_movable_denied) result.health = OdometryHealth::degenerate;
+}
+
 void Odometry::State::begin_anew(const FeatureSets& features, OdometryResult& result) {
   const bool has_first_alone = started && last.interval_s <= 0.0 && !has_prior_map;
   const bool is_lost_again = lost_scans > 0 && result.health == OdometryHealth::lost;
@@ -307,6 +336,7 @@ void Odometry::State::take(ScanInParts& parts, const Step& step, std::int64_t ti
   fits.add(step.result);
   update_state(time_ns, std::move(parts.view), step.T_map_lidar_middle);
   last.features = std::move(features);
+  movable = parts.movable;
   go_on_by_surfaces(parts, step);
 }
 

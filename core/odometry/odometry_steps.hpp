@@ -127,6 +127,9 @@ struct Odometry::State {
   /// Calls a pose good only where the map says so that is older than any doubt of the place.
   void confirm_place(const FeatureSets& features, const PosePrediction& prediction,
                      OdometryResult& result);
+  /// A pose that rests on what could move is degenerate unless that has proved to stand, or the
+  /// rest agrees: what stands beside the lidar may set off with it.
+  void doubt_what_could_move(const ScanInParts& parts, OdometryResult& result);
   /// Takes this scan for the first one where no other could be registered to that.
   void begin_anew(const FeatureSets& features, OdometryResult& result);
   /// Local map and velocity as they were before the stretch; where its motion led stays known.
@@ -170,6 +173,10 @@ struct Odometry::State {
   bool goes_on = false;
   /// The last motion was none of the robot: a place was found again, or a prior corrected itself.
   bool has_jumped = false;
+  /// What the last scan used of objects that could move, and whether the rest denied it since these
+  /// proved to stand.
+  MovableUse movable = MovableUse::none;
+  bool is_movable_denied = false;
   /// Scans in a row that could not be registered.
   int lost_scans = 0;
   ScanIntervals intervals;

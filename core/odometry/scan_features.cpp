@@ -16,9 +16,10 @@ constexpr float max_car_length_m = 15.0F;
 constexpr std::size_t min_static_features = 100;
 
 /// Of what stands up, or lies on the ground, and was not seen moving: below this share of what
-/// could not move, objects that could are used, too. Car parks leave 0.03 to 0.18, a jam of lorries
-/// between rails and trees 0.33, streets full of traffic 0.57.
+/// could not move, objects that could are used, too, and no longer above the other one. Car parks
+/// leave 0.03 to 0.18, a jam of lorries between rails and trees 0.33, streets full of traffic 0.57.
 constexpr double min_share_left = 0.25;
+constexpr double enough_share_left = 0.4;
 
 bool may_be_used(MotionClass motion, MovableUse use) {
   if (use == MovableUse::not_moving) return motion != MotionClass::moving;
@@ -96,8 +97,9 @@ class FeaturePoints {
 
 bool all_points(std::uint32_t) { return true; }
 
-FeatureSets usable_features(const ScanInParts& parts, const OdometryConfig& config) {
-  const UsablePoints usable(parts, parts.movable, config);
+FeatureSets usable_features(const ScanInParts& parts, MovableUse use,
+                            const OdometryConfig& config) {
+  const UsablePoints usable(parts, use, config);
   const FeaturePoints points(parts, config);
   std::vector<FeaturePoint> upright = points.of(parts.features.upright_points, all_points);
   if (!parts.features.point_tangents.empty())
@@ -117,6 +119,8 @@ FeatureSets usable_features(const ScanInParts& parts, const OdometryConfig& conf
 /// as in a car park, or where labels are wrong about all houses or the road.
 bool is_little_left(const ScanInParts& parts, const OdometryConfig& config) {
   if (parts.labels.empty() || config.paper_exact) return false;
+  const double min_share =
+      parts.movable == MovableUse::not_moving ? enough_share_left : min_share_left;
   const UsablePoints fixed(parts, MovableUse::none, config);
   const UsablePoints not_moving(parts, MovableUse::not_moving, config);
   const auto is_left_out = [&](const std::vector<std::uint32_t>& points, bool counts_ground) {
@@ -127,7 +131,7 @@ bool is_little_left(const ScanInParts& parts, const OdometryConfig& config) {
       ++all;
       left += fixed(i) ? 1 : 0;
     }
-    return static_cast<double>(left) < min_share_left * static_cast<double>(all);
+    return static_cast<double>(left) < min_share * static_cast<double>(all);
   };
   // Under a car the ground seems to stand up, too.
   return is_left_out(parts.features.upright_points, /*counts_ground=*/false) ||
@@ -137,13 +141,30 @@ bool is_little_left(const ScanInParts& parts, const OdometryConfig& config) {
 }  // namespace
 
 FeatureSets registered_features(ScanInParts& parts, const OdometryConfig& config) {
-  if (is_little_left(parts, config)) parts.movable = MovableUse::not_moving;
-  FeatureSets sets = usable_features(parts, config);
+  parts.movable = is_little_left(parts, config) ? MovableUse::not_moving : MovableUse::none;
+  FeatureSets sets = usable_features(parts, parts.movable, config);
   if (parts.movable == MovableUse::not_moving ||
       sets.edges.size() + sets.planes.size() + sets.surfaces.size() >= min_static_features)
     return sets;
   parts.movable = MovableUse::parked;
-  return usable_features(parts, config);
+  return usable_features(parts, parts.movable, config);
+}
+
+FeatureSets fixed_features(const ScanInParts& parts, const OdometryConfig& config) {
+  return usable_features(parts, MovableUse::none, config);
+}
+
+double parked_share(const ScanInParts& parts) {
+  std::size_t all = 0;
+  std::size_t parked = 0;
+  for (const std::uint32_t i : parts.features.upright_points) {
+    const std::int32_t object = parts.objects.of_point[i];
+    if (object == ObjectClusters::none) continue;
+    const MotionClass motion = parts.motion_classes[static_cast<std::size_t>(object)];
+    all += motion != MotionClass::moving ? 1 : 0;
+    parked += motion == MotionClass::parked ? 1 : 0;
+  }
+  return all == 0 ? 0.0 : static_cast<double>(parked) / static_cast<double>(all);
 }
 
 FeatureSets map_features(const ScanInParts& parts, const std::vector<Motion>& motion,

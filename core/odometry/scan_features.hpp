@@ -39,6 +39,7 @@ struct ScanInParts {
   /// Registered by surfaces, though few points have neighbours on another ring: the rings are far
   /// apart, or the local map is young.
   bool sparse_rings = false;
+  /// At first that of the scan before.
   MovableUse movable = MovableUse::none;
 };
 
@@ -47,6 +48,13 @@ struct ScanInParts {
 /// and all that were not seen moving where these are nearly all that stands up, or all of the
 /// ground.
 [[nodiscard]] FeatureSets registered_features(ScanInParts& parts, const OdometryConfig& config);
+
+/// The same without any objects that could move, however little is left.
+[[nodiscard]] FeatureSets fixed_features(const ScanInParts& parts, const OdometryConfig& config);
+
+/// Which share of the points that stand up on objects that could move, and were not seen moving, is
+/// on parked ones, 0..1.
+[[nodiscard]] double parked_share(const ScanInParts& parts);
 
 /// Those that enter the local map, without points that move. Edges, planes and points alone.
 [[nodiscard]] FeatureSets map_features(const ScanInParts& parts, const std::vector<Motion>& motion,

@@ -57,6 +57,16 @@ TEST(RangeImageHistory, PlaceOfTheSameCarIsTheSame) {
   EXPECT_EQ(observation(with_car(10.0), with_car(10.0), rear_at_10m), PastObservation::same);
 }
 
+TEST(RangeImageHistory, TellsHowFarTheLidarHasComeSinceTheOldestView) {
+  MotionConfig two_views = every_view();
+  two_views.range_image_history_size = 2;
+  RangeImageHistory history(two_views);
+  history.add(view(walled(), test::level_pose(1.0, 0.0, 0.0)));
+  EXPECT_EQ(history.distance_from_oldest_m({3.0, 0.0, 0.0}), 0.0) << "too few views";
+  history.add(view(walled(), test::level_pose(2.0, 0.0, 0.0)));
+  EXPECT_NEAR(history.distance_from_oldest_m({3.0, 0.0, 0.0}), 2.0, 1e-5);
+}
+
 TEST(RangeImageHistory, PlaceHiddenByAWallIsUnknown) {
   BoxWorld hidden = walled();
   hidden.stand(6.0, 0.0, {0.5, 10.0, 4.0}, SemanticClass::building);

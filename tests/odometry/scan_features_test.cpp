@@ -102,6 +102,25 @@ TEST(RegisteredFeatures, TakeTheRoadWhereLabelsSayThatItCouldMove) {
   EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 200U);
 }
 
+TEST(RegisteredFeatures, DoNotChangeToAndFroBetweenOneScanAndTheNext) {
+  LabelledPoints points(300, 20);
+  for (std::uint32_t i = 0; i < 300; ++i) points.parts.features.upright_points.push_back(i);
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 100U);
+  points.parts.movable = MovableUse::not_moving;
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 300U);
+  EXPECT_EQ(fixed_features(points.parts, OdometryConfig{}).surfaces.size(), 100U);
+}
+
+TEST(ParkedShare, IsThatOfTheObjectsThatWereNotSeenMoving) {
+  LabelledPoints points(200, 10);
+  EXPECT_EQ(parked_share(points.parts), 0.0);
+  for (std::uint32_t i = 0; i < 200; ++i) points.parts.features.upright_points.push_back(i);
+  EXPECT_EQ(parked_share(points.parts), 0.0);
+  points.parts.motion_classes[0] = points.parts.motion_classes[1] = MotionClass::moving;
+  points.parts.motion_classes[2] = points.parts.motion_classes[3] = MotionClass::parked;
+  EXPECT_EQ(parked_share(points.parts), 0.25);
+}
+
 TEST(RegisteredFeatures, TakeObjectsThatAreTallerThanAnyVehicle) {
   LabelledPoints points(200, 5);
   points.parts.objects.height_m[0] = 12.0F;
