@@ -156,6 +156,28 @@ TEST(Deskew, AgreesWithTheMatrixExponential) {
   }
 }
 
+TEST(Deskew, ToTheMiddleMovesManyPointsAsItMovesEach) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> any(-1.0, 1.0);
+  for (const double angle : {0.0, 1e-7, 1e-3, 0.1, 1.5, 3.1}) {
+    const auto vector = [&] { return Eigen::Vector3d(any(random), any(random), any(random)); };
+    const Twist twist{angle * vector().normalized(), 3.0 * vector()};
+    Scan scan;
+    // No multiple of how many are moved at once.
+    for (int i = 0; i < 1001; ++i) {
+      scan.points_lidar.push_back((50.0 * vector()).cast<float>());
+      scan.time_offset_s.push_back(static_cast<float>(0.05 * any(random)));
+    }
+    const Scan one_by_one = deskew(scan, part_of(twist, 1.0), 0.1);
+    deskew_to_middle(scan, {.middle_s = 0.0, .duration_s = 0.1}, part_of(twist, 1.0));
+    // Two rounding steps of a coordinate of 64 m.
+    constexpr float steps_m = 1.6e-5F;
+    for (std::size_t i = 0; i < scan.size(); ++i)
+      EXPECT_LE((scan.points_lidar[i] - one_by_one.points_lidar[i]).cwiseAbs().maxCoeff(), steps_m)
+          << "angle " << angle;
+  }
+}
+
 TEST(Deskew, MakesAWallFlatThatATurningLidarSawBent) {
   // The lidar drives 2 m and turns 0.2 rad in a revolution while it looks at the wall x = 20.
   const Twist twist{0.2 * Eigen::Vector3d::UnitZ(), {2.0, 0.1, 0.0}};
