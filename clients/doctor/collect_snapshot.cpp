@@ -153,6 +153,9 @@ SystemSnapshot collect_snapshot(const DoctorOptions& options) {
       .granted_buffer_bytes = dds::granted_socket_buffer_bytes(options.dds.socket_buffer_bytes)};
   // The machine was read before this participant adds its own ports and segments.
   dds::Participant participant(named(options.dds));
+  // A discovery server tells of nobody who has nothing for us.
+  const StatusClient asks_for_status(participant,
+                                     dds::services::get_status.in(options.server_name));
   listen(options, participant, snapshot);
   for (auto& [name_space, participants] : name_spaces(snapshot.participants)) {
     snapshot.servers.push_back(

@@ -11,6 +11,7 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -221,6 +222,12 @@ std::optional<std::int32_t> free_participant_id(std::uint32_t domain_id) {
 }
 
 }  // namespace
+
+bool is_told_by_discovery_server(const DdsOptions& options) {
+  if (!options.discovery_server.host.empty()) return true;
+  const char* const servers = std::getenv("ROS_DISCOVERY_SERVER");
+  return servers != nullptr && *servers != '\0';
+}
 
 std::vector<std::string> set_discovery(const DdsOptions& options, DomainParticipantQos& qos) {
   BuiltinAttributes& builtin = qos.wire_protocol().builtin;

@@ -14,4 +14,8 @@ namespace stillmap::dds {
 [[nodiscard]] std::vector<std::string> set_discovery(
     const DdsOptions& options, eprosima::fastdds::dds::DomainParticipantQos& qos);
 
+/// Whether a discovery server tells a participant of others, by these options or by
+/// ROS_DISCOVERY_SERVER, which Fast DDS reads: only of who has endpoints that match its own.
+[[nodiscard]] bool is_told_by_discovery_server(const DdsOptions& options);
+
 }  // namespace stillmap::dds

@@ -67,6 +67,12 @@ bool is_on_loopback_only(const RemoteParticipant& participant) {
          });
 }
 
+/// By the names that Fast DDS gives servers 0 to 255, here and in ROS 2.
+bool is_discovery_server(const RemoteParticipant& participant) {
+  return participant.guid.starts_with("44.53.") &&
+         participant.guid.ends_with(".5f.45.50.52.4f.53.49.4d.41");
+}
+
 constexpr const char* carriage_hint =
     "give the publisher's shared memory more room than a scan takes (Fast DDS: segment_size, 512 "
     "KB "
@@ -176,7 +182,8 @@ std::vector<Diagnostic> silent_participant_diagnostics(
   std::vector<Diagnostic> diagnostics;
   for (const RemoteParticipant& peer : peers) {
     const bool is_explained = peer.refused || peer.is_secured != self.is_secured;
-    if (!peer.endpoints.empty() || is_explained || peer.name == survey_participant) continue;
+    const bool has_none = peer.name == survey_participant || is_discovery_server(peer);
+    if (!peer.endpoints.empty() || is_explained || has_none) continue;
     if (is_on_loopback_only(peer) && !is_on_loopback_only(self)) {
       diagnostics.push_back(
           {.severity = Severity::problem,

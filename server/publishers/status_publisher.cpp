@@ -44,9 +44,9 @@ std::string reduced_pace(const dds::SegmentationStatus& segmentation) {
 
 }  // namespace
 
-DiscoveryDiagnostics::DiscoveryDiagnostics(const dds::Participant& participant,
-                                           std::string name_space)
-    : participant_(participant), name_space_(std::move(name_space)) {}
+DiscoveryDiagnostics::DiscoveryDiagnostics(dds::Participant& participant,
+                                           const std::string& name_space)
+    : participant_(participant), name_space_(name_space), namesakes_(participant, name_space) {}
 
 std::vector<dds::Diagnostic> DiscoveryDiagnostics::diagnostics() {
   const std::scoped_lock lock(mutex_);
@@ -61,8 +61,8 @@ std::vector<dds::Diagnostic> DiscoveryDiagnostics::diagnostics() {
 }
 
 std::string DiscoveryDiagnostics::namesake_refusal() {
-  const std::scoped_lock lock(mutex_);
-  const std::vector<dds::RemoteParticipant> others = namesakes(participant_.remote_participants());
+  const std::vector<dds::RemoteParticipant> others =
+      namesakes_.among(participant_.remote_participants());
   if (others.empty()) return {};
   std::string text = "it reaches " + std::to_string(others.size() + 1) + " servers called '" +
                      name_space_ + "', this one (" + host_name() + ", process " +
@@ -75,30 +75,14 @@ std::string DiscoveryDiagnostics::namesake_refusal() {
   }
   return text +
          ", so none carries it out: stop all but one, or give each its own topics.namespace or "
-         "domain (one that was killed counts until its lease ends, some seconds)";
-}
-
-std::vector<dds::RemoteParticipant> DiscoveryDiagnostics::namesakes(
-    const std::vector<dds::RemoteParticipant>& peers) {
-  std::vector<dds::RemoteParticipant> found = dds::servers_called(name_space_, peers);
-  std::erase_if(namesakes_since_, [&](const auto& known) {
-    return std::ranges::find(found, known.first, &dds::RemoteParticipant::guid) == found.end();
-  });
-  // A discovery server tells those who come of one that was killed, until its lease has run out.
-  const dds::DdsOptions& options = participant_.options();
-  const std::chrono::seconds patience(options.discovery_server.host.empty() ? 0
-                                                                            : options.lease_s + 2);
-  const auto now = Clock::now();
-  std::erase_if(found, [&](const dds::RemoteParticipant& server) {
-    return now - namesakes_since_.try_emplace(server.guid, now).first->second < patience;
-  });
-  return found;
+         "domain (one that was killed counts for a few seconds)";
 }
 
 std::vector<dds::Diagnostic> DiscoveryDiagnostics::collect() {
   const dds::RemoteParticipant self = participant_.self();
   const std::vector<dds::RemoteParticipant> peers = participant_.remote_participants();
-  std::vector<dds::Diagnostic> all = dds::namesake_diagnostics(name_space_, namesakes(peers));
+  std::vector<dds::Diagnostic> all =
+      dds::namesake_diagnostics(name_space_, namesakes_.among(peers));
   for (dds::Diagnostic& diagnostic : dds::mismatch_diagnostics(dds::mismatches_of(self, peers))) {
     all.push_back(std::move(diagnostic));
   }

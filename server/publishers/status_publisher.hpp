@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <functional>
-#include <map>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -15,6 +14,7 @@
 #include "server/monitoring/log.hpp"
 #include "server/monitoring/statistics.hpp"
 #include "server/publishers/latest_map.hpp"
+#include "server/publishers/namesakes.hpp"
 #include "server/threads/periodic_worker.hpp"
 #include "stillmap_msgs.h"
 
@@ -27,29 +27,25 @@ class DiscoveryDiagnostics {
  public:
   /// Each diagnostic is also logged when it occurs and was not among the last thousand.
   /// `name_space`: of the server's topics, by which clients call it.
-  DiscoveryDiagnostics(const dds::Participant& participant, std::string name_space);
+  DiscoveryDiagnostics(dds::Participant& participant, const std::string& name_space);
 
   /// At most a second old: comparing all endpoints takes time in a domain of many participants.
   [[nodiscard]] std::vector<dds::Diagnostic> diagnostics();
 
   /// Why a request that changes something is refused: it went to other servers of this name, too,
-  /// which are named. Empty while there is none. As discovery knows it now.
+  /// which are named. Empty while none is there. As discovery knows it now.
   [[nodiscard]] std::string namesake_refusal();
 
  private:
   using Clock = std::chrono::steady_clock;
 
   [[nodiscard]] std::vector<dds::Diagnostic> collect();
-  /// Other servers of this name, without those that may have been killed already.
-  [[nodiscard]] std::vector<dds::RemoteParticipant> namesakes(
-      const std::vector<dds::RemoteParticipant>& peers);
 
   const dds::Participant& participant_;
   const std::string name_space_;
+  Namesakes namesakes_;
   std::mutex mutex_;
   Clock::time_point collected_;
-  /// By guid, since when each of them is known.
-  std::map<std::string, Clock::time_point> namesakes_since_;
   std::vector<dds::Diagnostic> last_;
   NewLines logged_;
 };

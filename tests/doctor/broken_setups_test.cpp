@@ -94,6 +94,29 @@ TEST_F(BrokenSetup, IsTheLastThingThatAHealthyOneIs) {
   EXPECT_EQ(exit_code_, 0);
 }
 
+TEST_F(BrokenSetup, IsNoneThatADiscoveryServerTellsOf) {
+  dds::DdsOptions options = dds(domain_);
+  options.node_name = "";
+  options.shared_memory = false;
+  options.discovery_port = static_cast<std::uint16_t>(21'000 + domain_);
+  const dds::Participant discovery_server(options);
+  const std::string by =
+      "--dds-profile no_multicast --discovery-server 127.0.0.1:" + std::to_string(21'000 + domain_);
+  start_server(by);
+  dds::DdsOptions told = dds(domain_);
+  told.multicast = false;
+  told.discovery_server = {.host = "127.0.0.1", .port = options.discovery_port};
+  ScanPublisher publisher({.dds = told, .points_topic = "points"});
+  const std::jthread lidar([&](const std::stop_token& stop) {
+    for (int i = 0; !stop.stop_requested(); ++i) {
+      (void)publisher.publish(room_scan(i));
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+  });
+  EXPECT_THAT(problems(by), IsEmpty());
+  EXPECT_EQ(exit_code_, 0);
+}
+
 TEST_F(BrokenSetup, NamesTheNodesOfAParticipantWithoutAName) {
   dds::DdsOptions options = dds(domain_);
   options.node_name = "";

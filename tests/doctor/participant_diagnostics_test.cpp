@@ -55,6 +55,18 @@ TEST(ParticipantDiagnosticsTest, AreNotAboutADoctorThatLooksIn) {
   EXPECT_THAT(dds::silent_participant_diagnostics(participant("self"), {survey}), IsEmpty());
 }
 
+TEST(ParticipantDiagnosticsTest, AreNotAboutADiscoveryServerWhichHasNoTopics) {
+  dds::RemoteParticipant server = participant("stillmap");
+  server.endpoints.clear();
+  for (const char* const id : {"00", "1f"}) {
+    server.guid = std::string("44.53.") + id + ".5f.45.50.52.4f.53.49.4d.41";
+    for (const char* const address : {"10.0.0.5", "127.0.0.1"}) {
+      server.addresses = {address};
+      EXPECT_THAT(dds::silent_participant_diagnostics(participant("self"), {server}), IsEmpty());
+    }
+  }
+}
+
 TEST(ParticipantDiagnosticsTest, BlameSharedMemoryForASilentPeerOnThisHost) {
   dds::RemoteParticipant silent = participant("server");
   silent.endpoints.clear();

@@ -10,6 +10,7 @@
 #include "idl/dds/service_client.hpp"
 #include "idl/dds/service_server.hpp"
 #include "idl/interface/services.hpp"
+#include "idl/interface/topics.hpp"
 #include "tests/server/server_process.hpp"
 
 namespace stillmap::test {
@@ -154,8 +155,53 @@ TEST(Namesake, IsNoServerOfAnotherName) {
   EXPECT_FALSE(eventually([&] { return names_another(client.status()); }, std::chrono::seconds(3)));
 }
 
-/// Without a discovery server, who comes is told of those that live alone: the patience with one is
-/// not tested here.
+std::vector<std::string> with(std::vector<std::string> arguments,
+                              const std::vector<std::string>& more) {
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+TEST(Namesake, ThatIsKilledCountsUntilItsSilenceIsNoticed) {
+  const ServiceSetup setup("every");
+  const ServiceSetup another("every");
+  const ScratchFolder folder;
+  // Longer than this test waits.
+  const std::string profile = folder.file("network.yaml", "lease_s: 120\n").string();
+  const ServerProcess server(with(setup.server_arguments(), {"--dds-profile", profile}));
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  {
+    const ServerProcess second(with(another.server_arguments(), {"--dds-profile", profile}));
+    ASSERT_TRUE(eventually([&] { return names_another(client.status()); }));
+  }
+  EXPECT_TRUE(eventually([&] {
+    return refusal_by_server(setup, dds::services::reset, stillmap_msgs::srv::Reset_Request())
+        .empty();
+  }));
+  EXPECT_TRUE(eventually([&] { return !names_another(client.status()); }));
+}
+
+TEST(Namesake, IsToldByADiscoveryServerToo) {
+  const ServiceSetup setup("every");
+  const ServiceSetup another("every");
+  dds::DdsOptions options = setup.dds();
+  options.shared_memory = false;
+  options.discovery_port = static_cast<std::uint16_t>(21'000 + options.domain_id);
+  const dds::Participant discovery_server(options);
+  ClientOptions told = setup.client();
+  told.dds.multicast = false;
+  told.dds.discovery_server = {.host = "127.0.0.1", .port = options.discovery_port};
+  const std::vector<std::string> by{"--dds-profile", "no_multicast", "--discovery-server",
+                                    "127.0.0.1:" + std::to_string(options.discovery_port)};
+  const ServerProcess server(with(setup.server_arguments(), by));
+  Client client(told);
+  client.wait_for_server(patience);
+  EXPECT_FALSE(names_another(client.status()));
+  const ServerProcess second(with(another.server_arguments(), by));
+  EXPECT_TRUE(eventually([&] { return names_another(client.status()); }));
+}
+
+/// Without a discovery server, who comes is told of those that live alone.
 TEST(Namesake, IsNotHeardOfOnceItWasKilled) {
   const ServiceSetup setup("every");
   {
