@@ -65,8 +65,11 @@ struct CoarseCells::State {
   }
 };
 
-CoarseCells::CoarseCells(double resolution_m) : state_(std::make_unique<State>()) {
+CoarseCells::CoarseCells(double resolution_m, std::size_t expected)
+    : state_(std::make_unique<State>()) {
   state_->resolution_m = resolution_m;
+  state_->position.reserve(expected);
+  state_->cells.reserve(expected);
 }
 CoarseCells::~CoarseCells() = default;
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -15,7 +16,8 @@ class CoarseCells {
  public:
   /// `resolution_m` is not finer than the map's voxels. A voxel belongs to the cell that its mean
   /// lies in.
-  explicit CoarseCells(double resolution_m);
+  /// `expected` cells have room at once; there may be more.
+  explicit CoarseCells(double resolution_m, std::size_t expected = 0);
   ~CoarseCells();
   CoarseCells(const CoarseCells&) = delete;
   CoarseCells& operator=(const CoarseCells&) = delete;

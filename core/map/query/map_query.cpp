@@ -201,10 +201,19 @@ std::vector<TileChange> tile_changes(const Selection& from,
   return changes;
 }
 
+std::uint64_t voxel_count(const Selection& from, std::span<const std::size_t> tiles) {
+  std::uint64_t count = 0;
+  for (const std::size_t i : tiles) count += from.tiles[i]->info.voxel_count;
+  return count;
+}
+
 /// The cells of one strip of a coarser answer, merged from the tiles that reach into it.
 std::vector<QueryVoxel> merge(const Selection& from, const CoarseStrips& strips,
                               std::size_t strip) {
-  CoarseCells cells(from.query.resolution_m);
+  // So many of a surface meet in one.
+  const double edge = from.query.resolution_m / from.view.voxel_size_m;
+  const auto voxels = static_cast<double>(voxel_count(from, strips.tiles(strip)));
+  CoarseCells cells(from.query.resolution_m, static_cast<std::size_t>(voxels / (edge * edge)));
   for (const std::size_t i : strips.tiles(strip)) {
     const auto tile = from.reader.read(from.tiles[i]);
     const VoxelFilter filter(from.query, from.region, *tile);
@@ -218,12 +227,6 @@ std::vector<QueryVoxel> merge(const Selection& from, const CoarseStrips& strips,
     }
   }
   return cells.sorted();
-}
-
-std::uint64_t voxel_count(const Selection& from, std::span<const std::size_t> tiles) {
-  std::uint64_t count = 0;
-  for (const std::size_t i : tiles) count += from.tiles[i]->info.voxel_count;
-  return count;
 }
 
 /// Adds a strip's cells to a page, from the `begin`-th on; false, with the first that has no room
