@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <numbers>
 #include <random>
 #include <utility>
 #include <vector>
 
 #include "core/lidar/labelled_scan.hpp"
+#include "tests/lidar/boxes.hpp"
 
 // Made streets that lead over one another, and car parks.
 
@@ -20,17 +20,9 @@ constexpr double rad_per_deg = std::numbers::pi / 180.0;
 constexpr double lidar_height_m = 1.8;
 constexpr double max_range_m = 60.0;
 
-struct Box {
-  Eigen::Vector3d low, high;
-};
-
 /// Boxes that a lidar of 24 rings sees.
-class BoxWorld {
+class BoxWorld : public test::Boxes {
  public:
-  void add(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
-    boxes_.push_back({low, high});
-  }
-
   [[nodiscard]] LabelledScan scan_at(const Eigen::Isometry3d& T_map_lidar,
                                      std::uint64_t seed) const {
     std::mt19937_64 random(seed);
@@ -39,32 +31,15 @@ class BoxWorld {
     for (int ring = 0; ring < 24; ++ring) {
       const double elevation = (15.0 - 40.0 * ring / 23.0) * rad_per_deg;
       for (int k = 0; k < 360; ++k) {
-        const double azimuth = 1.0 * k * rad_per_deg;
-        const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
-                                  std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
-        const double range_m = range(T_map_lidar.translation(), T_map_lidar.linear() * ray);
-        if (range_m > max_range_m) continue;
-        scan.scan.points_lidar.push_back(((range_m + noise_m(random)) * ray).cast<float>());
+        const Eigen::Vector3d ray = test::ray_at(elevation, k * rad_per_deg);
+        const double hit_m = range_m(T_map_lidar.translation(), T_map_lidar.linear() * ray);
+        if (hit_m > max_range_m) continue;
+        scan.scan.points_lidar.push_back(((hit_m + noise_m(random)) * ray).cast<float>());
       }
     }
     scan.motion.assign(scan.scan.size(), Motion::stationary);
     return scan;
   }
-
- private:
-  [[nodiscard]] double range(const Eigen::Vector3d& from, const Eigen::Vector3d& ray) const {
-    double nearest = std::numeric_limits<double>::infinity();
-    for (const Box& box : boxes_) {
-      const Eigen::Array3d a = (box.low - from).array() / ray.array();
-      const Eigen::Array3d b = (box.high - from).array() / ray.array();
-      const double enter = a.min(b).maxCoeff();
-      const double leave = a.max(b).minCoeff();
-      if (enter > 0.0 && enter < leave) nearest = std::min(nearest, enter);
-    }
-    return nearest;
-  }
-
-  std::vector<Box> boxes_;
 };
 
 /// Two poses a metre apart, along a straight way that may climb.

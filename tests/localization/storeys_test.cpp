@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <numbers>
 #include <random>
@@ -12,6 +11,7 @@
 #include "core/localization/localizer.hpp"
 #include "core/map/query/tile_reader.hpp"
 #include "core/map/static_map.hpp"
+#include "tests/lidar/boxes.hpp"
 
 namespace stillmap::test {
 namespace {
@@ -21,12 +21,8 @@ constexpr double width_m = 26.0;
 constexpr double storey_m = 3.0;
 constexpr double lidar_height_m = 1.0;
 
-struct Box {
-  Eigen::Vector3d low, high;
-};
-
 /// A car park of two decks: slabs, walls, pillars at the same places, and other things on each.
-class CarPark {
+class CarPark : public Boxes {
  public:
   explicit CarPark(bool has_ramp) {
     // Beside the decks, seen from both.
@@ -72,36 +68,15 @@ class CarPark {
     for (int ring = 0; ring < 32; ++ring) {
       const double elevation = (15.0 - ring * 40.0 / 31.0) * std::numbers::pi / 180.0;
       for (int k = 0; k < 720; ++k) {
-        const double azimuth = k * std::numbers::pi / 360.0;
-        const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
-                                  std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
-        const double range_m = range(T_map_lidar.translation(), T_map_lidar.linear() * ray);
-        if (range_m > 80.0) continue;
-        scan.points_lidar.push_back((range_m * ray).cast<float>());
+        const Eigen::Vector3d ray = ray_at(elevation, k * std::numbers::pi / 360.0);
+        const double hit_m = range_m(T_map_lidar.translation(), T_map_lidar.linear() * ray);
+        if (hit_m > 80.0) continue;
+        scan.points_lidar.push_back((hit_m * ray).cast<float>());
         scan.ring.push_back(static_cast<std::uint16_t>(ring));
       }
     }
     return scan;
   }
-
- private:
-  void add(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
-    boxes_.push_back({low, high});
-  }
-
-  [[nodiscard]] double range(const Eigen::Vector3d& from, const Eigen::Vector3d& ray) const {
-    double nearest = std::numeric_limits<double>::infinity();
-    for (const Box& box : boxes_) {
-      const Eigen::Array3d a = (box.low - from).array() / ray.array();
-      const Eigen::Array3d b = (box.high - from).array() / ray.array();
-      const double enter = a.min(b).maxCoeff();
-      const double leave = a.max(b).minCoeff();
-      if (enter > 0.0 && enter < leave) nearest = std::min(nearest, enter);
-    }
-    return nearest;
-  }
-
-  std::vector<Box> boxes_;
 };
 
 /// Round the deck; `share` of the way.

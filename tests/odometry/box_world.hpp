@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <numbers>
 #include <optional>
 #include <random>
@@ -11,6 +10,7 @@
 
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/sensor_model.hpp"
+#include "tests/lidar/boxes.hpp"
 
 namespace stillmap::test {
 
@@ -78,7 +78,7 @@ class BoxWorld {
   static Eigen::Vector3d direction(const SensorModel& sensor, int ring, int column) {
     const double up = sensor.beam_elevation(ring);
     const double turn = std::numbers::pi * (1.0 - 2.0 * (column + 0.5) / sensor.columns);
-    return {std::cos(up) * std::cos(turn), std::cos(up) * std::sin(turn), std::sin(up)};
+    return ray_at(up, turn);
   }
 
   [[nodiscard]] std::optional<Hit> cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& beam,
@@ -87,28 +87,13 @@ class BoxWorld {
     if (beam.z() < 0.0)
       nearest = Hit{-(origin.z() + lidar_height_m) / beam.z(), SemanticClass::road, false};
     for (const WorldBox& box : boxes) {
-      const Eigen::Vector3d centre = box.centre_map + time_s * box.velocity_map;
-      const auto range_m = range_to_box(centre - origin, 0.5 * box.size_m, beam);
+      const Eigen::Vector3d centre = box.centre_map + time_s * box.velocity_map - origin;
+      const Eigen::Vector3d half = 0.5 * box.size_m;
+      const auto range_m = range_to_box(centre - half, centre + half, beam);
       if (range_m && (!nearest || *range_m < nearest->range_m))
         nearest = Hit{*range_m, box.label, box.velocity_map.norm() > 0.0};
     }
     return nearest;
-  }
-
-  /// Slab test.
-  static std::optional<double> range_to_box(const Eigen::Vector3d& centre,
-                                            const Eigen::Vector3d& half,
-                                            const Eigen::Vector3d& beam) {
-    double enter = 0.0;
-    double leave = std::numeric_limits<double>::infinity();
-    for (int axis = 0; axis < 3; ++axis) {
-      const double a = (centre[axis] - half[axis]) / beam[axis];
-      const double b = (centre[axis] + half[axis]) / beam[axis];
-      enter = std::max(enter, std::min(a, b));
-      leave = std::min(leave, std::max(a, b));
-    }
-    if (enter > leave || enter <= 0.0) return std::nullopt;
-    return enter;
   }
 };
 
