@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include "server/mapping/mapping_thread.hpp"
 #include "server/publishers/status_publisher.hpp"
 #include "tests/eventually.hpp"
@@ -47,6 +49,15 @@ class SlowSegmentation : public testing::Test {
       work_off();
       std::this_thread::sleep_until(due);
     }
+  }
+  /// As many as it takes, which are more on a busy machine.
+  [[nodiscard]] bool drives_until(const std::function<bool(const dds::ServerStatus&)>& holds) {
+    const auto deadline = Clock::now() + test::patience;
+    while (!holds(status())) {
+      if (Clock::now() > deadline) return false;
+      drive_one_by_one(1);
+    }
+    return true;
   }
   void send() {
     statistics_.scan_received();
@@ -97,11 +108,10 @@ TEST_F(SlowSegmentation, DelaysNoPoseBeyondTheBudgetAndIsUsedForEveryNthScan) {
   EXPECT_LT(median_ms("segment"), 1.9 * period_ms);
 
   source_.delay_ms = 0;
-  drive(20);
-  const dds::ServerStatus fast = status();
-  EXPECT_EQ(fast.segmentation.interval, 1U);
-  EXPECT_GT(fast.segmentation.fresh_share, 0.0);
-  EXPECT_EQ(fast.reason, "");
+  EXPECT_TRUE(drives_until([](const dds::ServerStatus& fast) {
+    return fast.segmentation.interval == 1U && fast.segmentation.fresh_share > 0.0 &&
+           fast.reason.empty();
+  })) << status().reason;
 }
 
 TEST_F(SlowSegmentation, LooksMoreCoarselyBeforeScansAreLeftOut) {
@@ -117,9 +127,9 @@ TEST_F(SlowSegmentation, LooksMoreCoarselyBeforeScansAreLeftOut) {
   EXPECT_THAT(slow.reason, HasSubstr("600 columns wide instead of 2000"));
 
   source_.delay_ms = 0;
-  drive(40);
-  EXPECT_EQ(status().segmentation.image_columns, 2000U);
-  EXPECT_EQ(status().reason, "");
+  EXPECT_TRUE(drives_until([](const dds::ServerStatus& fast) {
+    return fast.segmentation.image_columns == 2000U && fast.reason.empty();
+  })) << status().reason;
 }
 
 TEST_F(SlowSegmentation, ThatFailsLeavesPosesAndMap) {
