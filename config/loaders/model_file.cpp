@@ -113,6 +113,15 @@ void read_unsure_votes(YamlSection section, std::optional<UnsureVoteConfig>& vot
   if (use) votes = read;
 }
 
+void read_island_votes(YamlSection section, std::optional<IslandVoteConfig>& votes) {
+  bool use = true;
+  IslandVoteConfig read;
+  section.boolean("use", use);
+  section.number("edge_m", read.edge_m, {0.05, 10});
+  section.number("share", read.share, {1e-3, 1e3});
+  if (use) votes = read;
+}
+
 std::optional<TrainedSensors> read_trained_for(YamlSection section) {
   TrainedSensors seen;
   section.require({"min_beams", "max_beams", "fov_up_deg", "fov_down_deg"});
@@ -148,6 +157,7 @@ void read_model(YamlSection file, ModelDescription& model) {
     // As models had it that could not say.
     model.unsure_votes = UnsureVoteConfig{};
   }
+  if (file.has("island_votes")) read_island_votes(file.section("island_votes"), model.island_votes);
   if (model.fov_up <= model.fov_down) file.fault("image", "fov_down_deg must be below fov_up_deg");
 }
 

@@ -124,6 +124,7 @@ std::string ModelDescription::faults() const {
   if (knn) faults += knn->faults();
   if (voxel_votes) faults += voxel_votes->faults();
   if (unsure_votes) faults += unsure_votes->faults();
+  if (island_votes) faults += island_votes->faults();
   return faults;
 }
 

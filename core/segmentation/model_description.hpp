@@ -13,6 +13,7 @@
 #include "core/lidar/semantic_class.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/segmentation/int8_calibration.hpp"
+#include "core/segmentation/island_votes.hpp"
 #include "core/segmentation/knn_postprocess.hpp"
 #include "core/segmentation/lidar_tilt.hpp"
 #include "core/segmentation/voxel_votes.hpp"
@@ -90,10 +91,11 @@ struct ModelDescription {
   std::vector<SemanticClass> classes;
   /// Without it a point takes the class of its pixel.
   std::optional<KnnConfig> knn;
-  /// Points vote once more in space, all of them and then those that are unsure; without either
-  /// these votes do not take place.
+  /// Points vote once more in space, all of them, then those that are unsure, then what surrounds
+  /// vehicles; without one of these, that vote does not take place.
   std::optional<VoxelVoteConfig> voxel_votes;
   std::optional<UnsureVoteConfig> unsure_votes;
+  std::optional<IslandVoteConfig> island_votes;
   /// Leaves the scan's point 0 out of the image, as lidar-bonnetal's mask does. For parity tests.
   bool mask_first_point = false;
   /// Without it the network cannot run in 8-bit integers.

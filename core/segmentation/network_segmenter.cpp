@@ -114,6 +114,7 @@ PointLabels voted_labels(const RangeImage& image, const PixelLabels& pixels,
       model.knn ? knn_labels(image, pixels, *model.knn) : labels_of_own_pixel(image, pixels);
   if (model.voxel_votes) vote_in_voxels(points, *model.voxel_votes, labels);
   if (model.unsure_votes) vote_where_unsure(points, *model.unsure_votes, labels);
+  if (model.island_votes) vote_on_islands(points, *model.island_votes, labels);
   return labels;
 }
 

@@ -99,6 +99,16 @@ TEST(ModelFile, HasVotesOfThoseWhoAreUnsureAfterThoseInVoxelsUnlessItSaysOtherwi
   EXPECT_FALSE(load_model(sound).unsure_votes.has_value());
 }
 
+TEST(ModelFile, ReadsVotesAroundVehicles) {
+  const std::string yaml = sound + "island_votes: {edge_m: 0.4, share: 1.5}\n";
+  const ModelDescription model = load_model(yaml);
+  ASSERT_TRUE(model.island_votes.has_value());
+  EXPECT_EQ(model.island_votes->edge_m, 0.4);
+  EXPECT_EQ(model.island_votes->share, 1.5);
+  EXPECT_FALSE(load_model(sound).island_votes.has_value());
+  EXPECT_THAT(refusal_of(yaml, "share: 1.5", "share: 0"), HasSubstr("island_votes.share"));
+}
+
 TEST(ModelFile, ReadsWhetherTheNetworkTakesTheSlope) {
   EXPECT_EQ(load_model(sound).statistics.channels, 5U);
   std::string yaml = sound;

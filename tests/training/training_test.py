@@ -405,6 +405,7 @@ class Training(unittest.TestCase):
         self.assertEqual(description["voxel_votes"]["use"], True)
         self.assertEqual(description["voxel_votes"]["height_m"], 0.1)
         self.assertEqual(description["unsure_votes"]["unsure_below"], 0.35)
+        self.assertEqual(description["island_votes"], {"use": True, "edge_m": 0.3, "share": 0.7})
         image = description["image"]
         self.assertEqual((image["columns"], image["min_columns"]), (256, 128))
         # A run from that model begins where this one ended.

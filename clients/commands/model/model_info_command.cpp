@@ -40,6 +40,7 @@ std::string votes_in_words(const ModelDescription& model) {
     words += ", then of the unsure in such of " + fixed(model.unsure_votes->edge_m, 2) + " m, " +
              fixed(model.unsure_votes->height_m, 2) + " m high";
   }
+  if (model.island_votes) words += ", then around vehicles";
   return words;
 }
 

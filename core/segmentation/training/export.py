@@ -75,6 +75,7 @@ def describe_run(arguments, state):
         # A run from before there were any has none.
         config.get("voxel_votes"),
         config.get("unsure_votes"),
+        config.get("island_votes"),
     )
 
 

@@ -39,12 +39,13 @@ def describe(
     follow_sensor=False,
     voxel_votes=None,
     unsure_votes=None,
+    island_votes=None,
 ):
     """The content of model.yaml. `words`: name, licence, sensor, trained_for, lidar_height_m,
     training, accuracy; `classes`: name of the class of each output; `knn`: None, or neighbours, window, sigma,
     cutoff_m; `voxel_votes`: None, or edge_m, height_m, neighbour_weight, own_weight; `unsure_votes`:
     None (the usual ones after votes in voxels), or edge_m, height_m, neighbour_weight, unsure_below,
-    unsure_small_below, small_weight."""
+    unsure_small_below, small_weight; `island_votes`: None, or edge_m, share."""
     description = {
         **words,
         "image": {**image, "follow_sensor": follow_sensor},
@@ -58,6 +59,8 @@ def describe(
     }
     if unsure_votes is not None:
         description["unsure_votes"] = {"use": True, **unsure_votes}
+    if island_votes is not None:
+        description["island_votes"] = {"use": True, **island_votes}
     return description
 
 
