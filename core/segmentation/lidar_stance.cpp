@@ -104,7 +104,7 @@ bool is_plane_in_both_halves(const LevelPlane& plane, std::span<const Eigen::Vec
 /// either. Where it sees no ground on a side, as behind one that looks down ahead, nothing speaks
 /// against the plane.
 bool has_another_grade(const LevelPlane& plane, std::span<const Eigen::Vector3f> lowest) {
-  constexpr double min_share = 0.5, same_foot_m = 0.5;
+  constexpr double min_share = 0.6, same_foot_m = 0.5;
   std::array<std::vector<Eigen::Vector3f>, 2> sides;
   for (const Eigen::Vector3f& p : lowest)
     sides[plane.slope.dot(p.head<2>().cast<double>()) < 0.0 ? 0 : 1].push_back(p);
