@@ -107,7 +107,21 @@ FirstRound first_round(const Arguments& arguments, int seed) {
   return round;
 }
 
+/// Whether a scan was taken inside an oncoming vehicle, which drives through this lidar: its points
+/// are of that, and show nothing of the place.
+bool is_inside_vehicle(const Scan& scan) {
+  constexpr float vehicle_m = 3.0F;
+  const auto is_of_vehicle = [&](std::size_t i) {
+    return is_movable(scan.labels[i]) && scan.points_lidar[i].norm() < vehicle_m;
+  };
+  std::size_t near = 0;
+  for (std::size_t i = 0; i < scan.size(); ++i) near += is_of_vehicle(i) ? 1 : 0;
+  return 2 * near > scan.size();
+}
+
 struct Tally {
+  /// Taken inside a vehicle; none of the others is.
+  int inside = 0;
   int right = 0;
   int wrong = 0;
   int ambiguous = 0;
@@ -132,6 +146,10 @@ Tally localize_places(const Arguments& arguments, const Localizer& localizer,
     const int index = static_cast<int>((k + 0.5) * config.scans / arguments.places);
     const simulation::SimulatedScan simulated = simulation.scan(index);
     const Scan scan = drop_unusable_points(simulated.scan, PrepareConfig{});
+    if (is_inside_vehicle(scan)) {
+      ++tally.inside;
+      continue;
+    }
     PointLabels labels;
     if (!arguments.without_labels) labels.classes = scan.labels;
     const auto start = Clock::now();
@@ -180,16 +198,18 @@ Tally localize_places(const Arguments& arguments, const Localizer& localizer,
 void print(const std::string& what, Tally tally) {
   std::ranges::sort(tally.times_ms);
   const std::size_t count = tally.times_ms.size();
-  std::printf("| %-48s | %4d | %4d | %4d | %4d | %6.0f | %6.0f |\n", what.c_str(), tally.right,
-              tally.wrong, tally.ambiguous, tally.not_found, tally.times_ms[count / 2],
-              tally.times_ms.back());
+  const double median_ms = count == 0 ? 0.0 : tally.times_ms[count / 2];
+  const double most_ms = count == 0 ? 0.0 : tally.times_ms.back();
+  std::printf("| %-48s | %4d | %4d | %4d | %4d | %6d | %6.0f | %6.0f |\n", what.c_str(),
+              tally.right, tally.wrong, tally.ambiguous, tally.not_found, tally.inside, median_ms,
+              most_ms);
   std::fflush(stdout);
 }
 
 int print_table(const Arguments& arguments) {
   std::printf(
-      "| places                                           | right| wrong| ambig| none | ms med | "
-      "ms max |\n");
+      "| places                                           | right| wrong| ambig| none | inside | "
+      "ms med | ms max |\n");
   for (const std::string& seed_text : arguments.seeds) {
     const int seed = std::stoi(seed_text);
     const FirstRound round = first_round(arguments, seed);
