@@ -95,11 +95,14 @@ class LiveTile::Selection {
   std::uint32_t last_scan_ = 0;
 };
 
-LiveTile::LiveVoxel* LiveTile::find(const TilePoint& point, std::uint32_t likely_position) {
-  if (likely_position != PositionIndex::none && key_at()(likely_position) == point.voxel_key)
+LiveTile::LiveVoxel* LiveTile::find(std::uint32_t key, std::uint32_t likely_position) {
+  if (likely_position != PositionIndex::none && key_at()(likely_position) == key)
     return &at(likely_position);
-  const std::uint32_t position = index_.find(point.voxel_key, key_at());
-  if (position != PositionIndex::none) return &at(position);
+  const std::uint32_t position = index_.find(key, key_at());
+  return position == PositionIndex::none ? nullptr : &at(position);
+}
+
+LiveTile::LiveVoxel* LiveTile::make(const TilePoint& point) {
   if (point.motion != Motion::stationary || size() >= PositionIndex::max_entries) return nullptr;
   excluded_.erase(point.voxel_key);
   return &add_fresh(point.voxel_key);
@@ -122,10 +125,15 @@ void LiveTile::begin_session(std::uint32_t max_scans, const VisibilityRule& rule
     for (LiveVoxel& voxel : *voxels) forget_beyond(voxel, max_scans, rule);
 }
 
-void LiveTile::insert(std::span<const TilePoint> points, std::uint32_t scan) {
+void LiveTile::insert(std::span<const TilePoint> points, std::uint32_t scan,
+                      const SettledVoxels* settled) {
+  if (settled != nullptr) {
+    first_seen_ns_ = std::min(first_seen_ns_, settled->stamps.stamp_ns(scan));
+    if (first_seen_ns_ >= settled->before_ns) settled = nullptr;
+  }
   for (std::size_t begin = 0; begin < points.size(); begin += block_size) {
     const auto block = points.subspan(begin, std::min(block_size, points.size() - begin));
-    insert_block(block, prefetch_voxels(block), scan);
+    insert_block(block, prefetch_voxels(block), scan, settled);
   }
 }
 
@@ -147,7 +155,7 @@ LiveTile::LikelyPositions LiveTile::prefetch_voxels(std::span<const TilePoint> p
 }
 
 void LiveTile::insert_block(std::span<const TilePoint> points, const LikelyPositions& positions,
-                            std::uint32_t scan) {
+                            std::uint32_t scan, const SettledVoxels* settled) {
   std::optional<std::uint32_t> key;
   auto position = positions.begin();
   LiveVoxel* voxel = nullptr;
@@ -158,8 +166,12 @@ void LiveTile::insert_block(std::span<const TilePoint> points, const LikelyPosit
     if (key != point.voxel_key || makes_voxel) {
       const bool is_next = key != point.voxel_key;
       key = point.voxel_key;
-      voxel = find(point, is_next ? *position++ : PositionIndex::none);
       excluded = nullptr;
+      voxel = find(point.voxel_key, is_next ? *position++ : PositionIndex::none);
+      if (voxel == nullptr) {
+        if (settled != nullptr && add_to_settled(point, scan, *settled)) continue;
+        voxel = make(point);
+      }
     }
     if (voxel != nullptr) {
       hit(*voxel, point, scan);
@@ -387,6 +399,7 @@ void LiveTile::add(const PackedVoxels& known,
                    const std::function<VoxelHistory(std::size_t)>& history, ScanStamps& stamps) {
   std::vector<std::uint32_t> scan_of;
   scan_of.reserve(known.stamps_ns().size());
+  if (!known.empty()) first_seen_ns_ = std::min(first_seen_ns_, known.stamps_ns().front());
   for (const std::int64_t stamp_ns : known.stamps_ns()) scan_of.push_back(stamps.add(stamp_ns));
   for (std::size_t i = 0; i < known.size(); ++i) {
     const VoxelHistory counts = history(i);

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -64,6 +65,17 @@ struct VisibilityTest {
   const ScanStamps* stamps = nullptr;
 };
 
+/// Which voxels have been there for so long that a point beside one, within what ranges and poses
+/// err by, is taken for one of it: see LiveTile::insert.
+struct SettledVoxels {
+  /// Those of the tile's scans.
+  const ScanStamps& stamps;
+  /// They were seen before this time.
+  std::int64_t before_ns = 0;
+  /// And are shown by this rule.
+  VisibilityRule rule;
+};
+
 /// The mutable side of a tile: all evidence so far, also of voxels that no snapshot shows yet, in
 /// some 38 bytes a voxel. Scans are named by their number in the map's `ScanStamps`, which must
 /// outlive the tile.
@@ -77,8 +89,12 @@ class LiveTile {
   /// at most, for or against a voxel. What is shown does not change by that.
   void begin_session(std::uint32_t max_scans, const VisibilityRule& rule);
 
-  /// Points in voxels beyond the first 16,777,215 of a tile are left out.
-  void insert(std::span<const TilePoint> points, std::uint32_t scan);
+  /// Points in voxels beyond the first 16,777,215 of a tile are left out. Where there is no voxel
+  /// yet, a point within a quarter of a voxel, and 5 cm, of a settled one counts for that: surfaces
+  /// that lie on a border of voxels would double with every visit. Not a point of another class, or
+  /// of something thin.
+  void insert(std::span<const TilePoint> points, std::uint32_t scan,
+              const SettledVoxels* settled = nullptr);
 
   /// Counts a miss for each voxel that the scan saw through, and for each earlier scan that saw
   /// through a voxel which came after it; and hides what was a part of what is hidden. True when
@@ -163,15 +179,25 @@ class LiveTile {
   [[nodiscard]] auto key_at() const {
     return [this](std::uint32_t position) { return at(position).packed.key; };
   }
-  /// Null where there is no such voxel and the point makes none. It is looked for at its likely
-  /// position first (PositionIndex).
-  [[nodiscard]] LiveVoxel* find(const TilePoint& point, std::uint32_t likely_position);
+  /// Null where there is no such voxel. It is looked for at its likely position first
+  /// (PositionIndex), where there is one.
+  [[nodiscard]] LiveVoxel* find(std::uint32_t key,
+                                std::uint32_t likely_position = PositionIndex::none);
+  /// The voxel of a point that there is none of yet; null where it makes none.
+  [[nodiscard]] LiveVoxel* make(const TilePoint& point);
   LiveVoxel& add_fresh(std::uint32_t key);
   /// So many points are looked up before they are added: their voxels are on their way meanwhile.
   static constexpr std::size_t block_size = 64;
   using LikelyPositions = std::array<std::uint32_t, block_size>;
   void insert_block(std::span<const TilePoint> points, const LikelyPositions& positions,
-                    std::uint32_t scan);
+                    std::uint32_t scan, const SettledVoxels* settled);
+  /// Counts a point, of which there is no voxel yet, for a settled one beside it. False where there
+  /// is none.
+  [[nodiscard]] bool add_to_settled(const TilePoint& point, std::uint32_t scan,
+                                    const SettledVoxels& settled);
+  /// The voxel of this key, where a point may be of it; null where not.
+  [[nodiscard]] LiveVoxel* find_settled(std::uint32_t key, const TilePoint& point,
+                                        const SettledVoxels& settled);
   /// Asks for the memory of the voxels that these points hit. Returns their likely positions, one
   /// for all points that follow each other in a voxel.
   [[nodiscard]] LikelyPositions prefetch_voxels(std::span<const TilePoint> points) const;
@@ -224,6 +250,8 @@ class LiveTile {
   std::vector<std::uint32_t> hidden_;
   tsl::robin_map<std::uint32_t, Excluded, IndexHash> excluded_;
   std::shared_ptr<const Tile> published_;
+  /// Before this there was no voxel: nothing is settled then.
+  std::int64_t first_seen_ns_ = std::numeric_limits<std::int64_t>::max();
   /// Voxels that appeared, went or got another class since the last record.
   std::size_t unrecorded_voxels_ = 0;
   std::size_t recording_voxels_ = 0;

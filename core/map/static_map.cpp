@@ -46,6 +46,10 @@ const StaticMapConfig& checked(const StaticMapConfig& config) {
   return config;
 }
 
+/// What was there before the session, or for so long, is settled: a lidar that drives by has a
+/// place in sight for less.
+constexpr std::int64_t settled_ns = 60'000'000'000;
+
 bool is_same_size(double a_m, double b_m) { return std::abs(a_m - b_m) <= 1e-9; }
 
 }  // namespace
@@ -121,6 +125,9 @@ struct StaticMap::State {
   [[nodiscard]] std::set<TileId> to_reload(const MapCorrection& correction) const;
   [[nodiscard]] double reach_m() const { return config.max_range_m + 2.0 * config.tile_size_m; }
 
+  /// To be called with each scan of a session.
+  [[nodiscard]] std::int64_t settled_before_ns(std::int64_t stamp_ns);
+
   StaticMapConfig config;
   /// Of the poses that it was made by.
   std::uint64_t corrections = 0;
@@ -129,6 +136,8 @@ struct StaticMap::State {
   bool is_frozen = false;
   /// What scans of earlier sessions count at most; nothing in the first one.
   std::optional<std::uint32_t> max_earlier_scans;
+  /// Of the first scan of a later one.
+  std::optional<std::int64_t> session_begin_ns;
   /// Tiles that the session has changed.
   std::set<TileId> in_session;
   /// Scans so far.
@@ -170,6 +179,11 @@ void StaticMap::State::enter_session(std::span<LiveTile* const> changing) {
                     [&](std::size_t i) { entering[i]->begin_session(*max_earlier_scans, rule()); });
 }
 
+std::int64_t StaticMap::State::settled_before_ns(std::int64_t stamp_ns) {
+  if (max_earlier_scans && !session_begin_ns) session_begin_ns = stamp_ns;
+  return std::max(session_begin_ns.value_or(stamp_ns - settled_ns), stamp_ns - settled_ns);
+}
+
 void StaticMap::State::keep(RangeImageView view, std::uint32_t scan) {
   past_views.push_back(std::move(view));
   if (past_views.size() > config.free_space_history) past_views.pop_front();
@@ -199,11 +213,13 @@ void StaticMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_
   std::ranges::transform(batches, hit.begin(),
                          [&](const auto& batch) { return tiles.tile(batch.tile); });
   state_->enter_session(hit);
+  const SettledVoxels settled{tiles.stamps(), state_->settled_before_ns(scan.scan.stamp_ns),
+                              state_->rule()};
   // A tile belongs to one task, which takes its points in the order of the scan: the map does not
   // depend on how many threads there are.
   tbb::parallel_for(std::size_t{0}, hit.size(), [&](std::size_t i) {
     if (hit[i] == nullptr) return;
-    hit[i]->insert(batches[i].points, number);
+    hit[i]->insert(batches[i].points, number, &settled);
   });
   tiles.begin_step();
   for (LiveTile* const tile : hit) {
@@ -214,6 +230,7 @@ void StaticMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_
 
 void StaticMap::begin_session(std::uint32_t max_scans) {
   state_->max_earlier_scans = max_scans;
+  state_->session_begin_ns.reset();
   state_->in_session.clear();
   state_->forget_views();
 }
@@ -338,6 +355,7 @@ void StaticMap::reset(std::uint64_t map_id) {
   state_->in_checkpoint.clear();
   state_->inserted = 0;
   state_->max_earlier_scans.reset();
+  state_->session_begin_ns.reset();
   state_->in_session.clear();
   state_->forget_views();
 }
