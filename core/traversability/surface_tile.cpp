@@ -22,6 +22,9 @@ constexpr double apart_slope = 0.6;
 /// difference [m] and rise per metre.
 constexpr double unseen_drop_m = 0.25;
 constexpr double unseen_slope = 0.5;
+/// From this slope on the lower ground beyond unknown ground lies behind an edge as likely as on a
+/// slope: a lidar that sees over an edge sees no slope as steep as it looks down.
+constexpr double hidden_slope = 0.3;
 /// Distance on either side up to which the rise without the step is measured [cells].
 constexpr int rise_cells = 3;
 
@@ -157,32 +160,50 @@ double step_along(const GroundGrid& ground, int x, int y, std::pair<int, int> d)
   return std::max(0.0, std::abs(difference_m) - std::abs(explained_m));
 }
 
-/// Step between the cell and the first known one beyond unknown ground, to either side.
-double step_beyond_unknown(const GroundGrid& ground, int x, int y, std::pair<int, int> d,
-                           double cell_m) {
+/// How much lower the first known cell beyond unknown ones lies, and how far away: lower than the
+/// slope before the gap leads to, or, negative, higher.
+struct BeyondUnknown {
+  double drop_m = 0.0;
+  double distance_m = 0.0;
+
+  /// Whether a slope (rise per metre) may lead there.
+  [[nodiscard]] bool is_on_slope(double slope) const {
+    return std::abs(drop_m) <= std::max(unseen_drop_m, slope * distance_m);
+  }
+};
+
+/// Nothing where the next cell is known, or none within `max_filled_gap_m`.
+std::optional<BeyondUnknown> beyond_unknown(const GroundGrid& ground, int x, int y,
+                                            std::pair<int, int> d, int sign, double cell_m) {
   const double length_m = cell_m * std::hypot(d.first, d.second);
   const int cells = static_cast<int>(max_filled_gap_m / length_m);
-  double step_m = 0.0;
-  for (const int sign : {-1, 1}) {
-    const int beside_x = x + sign * d.first;
-    const int beside_y = y + sign * d.second;
-    const bool is_wall = ground.contains(beside_x, beside_y) &&
-                         ground(beside_x, beside_y).origin == GroundOrigin::assumed;
-    for (int i = 1; i <= cells; ++i) {
-      const auto beyond_m = height_at(ground, x + sign * i * d.first, y + sign * i * d.second);
-      if (!beyond_m) continue;
-      // What stands between is in the way of a robot down here; up there the drop is.
-      if (is_wall && *beyond_m > ground(x, y).height_m) break;
-      // A slope goes on beyond the gap as it comes to it.
-      const auto outwards_m = rise_beyond(ground, x, y, d, -sign);
-      const double foreseen_m = outwards_m ? sign * *outwards_m * i : 0.0;
-      const double difference_m = std::abs(*beyond_m - ground(x, y).height_m - foreseen_m);
-      const bool is_slope = difference_m <= std::max(unseen_drop_m, unseen_slope * i * length_m);
-      if (i > 1 && !is_slope) step_m = std::max(step_m, difference_m);
-      break;
-    }
+  for (int i = 1; i <= cells; ++i) {
+    const auto beyond_m = height_at(ground, x + sign * i * d.first, y + sign * i * d.second);
+    if (!beyond_m) continue;
+    if (i == 1) return std::nullopt;
+    // What stands between is in the way of a robot down here; up there the drop is.
+    const bool is_wall =
+        ground(x + sign * d.first, y + sign * d.second).origin == GroundOrigin::assumed;
+    if (is_wall && *beyond_m > ground(x, y).height_m) return std::nullopt;
+    // A slope goes on beyond the gap as it comes to it.
+    const auto outwards_m = rise_beyond(ground, x, y, d, -sign);
+    const double foreseen_m = outwards_m ? sign * *outwards_m * i : 0.0;
+    return BeyondUnknown{ground(x, y).height_m + foreseen_m - *beyond_m, i * length_m};
   }
-  return step_m;
+  return std::nullopt;
+}
+
+/// Adds the step and the hidden drop beyond unknown ground to either side.
+void add_beyond_unknown(const GroundGrid& ground, int x, int y, std::pair<int, int> d,
+                        double cell_m, SurfaceShape& shape) {
+  for (const int sign : {-1, 1}) {
+    const auto beyond = beyond_unknown(ground, x, y, d, sign, cell_m);
+    if (!beyond) continue;
+    const auto drop_m = static_cast<float>(beyond->drop_m);
+    if (!beyond->is_on_slope(unseen_slope)) shape.step_m = std::max(shape.step_m, std::abs(drop_m));
+    if (!beyond->is_on_slope(hidden_slope))
+      shape.hidden_drop_m = std::max(shape.hidden_drop_m, drop_m);
+  }
 }
 
 static_assert(surface_reach_m > max_filled_gap_m + 1.0, "both ends of a gap need their slopes");
@@ -206,9 +227,8 @@ SurfaceShape shape_at(const GroundGrid& ground, int x, int y, double cell_m) {
   set_plane(plane_around(ground, x, y, cell_m), shape);
   constexpr std::array<std::pair<int, int>, 4> lines{{{1, 0}, {1, 1}, {0, 1}, {-1, 1}}};
   for (const auto& line : lines) {
-    const double step_m =
-        std::max(step_along(ground, x, y, line), step_beyond_unknown(ground, x, y, line, cell_m));
-    shape.step_m = std::max(shape.step_m, static_cast<float>(step_m));
+    shape.step_m = std::max(shape.step_m, static_cast<float>(step_along(ground, x, y, line)));
+    add_beyond_unknown(ground, x, y, line, cell_m, shape);
   }
   return shape;
 }

@@ -19,6 +19,9 @@ struct SurfaceShape {
   /// Largest step between the cell and its neighbours, less the rise that the slope explains, or to
   /// the ground beyond what is unknown beside it [m].
   float step_m = 0.0F;
+  /// Largest drop to the ground beyond what is unknown beside it [m], where a slope that may lead
+  /// there was not seen: for robots that may drive over unknown ground.
+  float hidden_drop_m = 0.0F;
 
   friend bool operator==(const SurfaceShape&, const SurfaceShape&) = default;
 };
@@ -27,7 +30,8 @@ struct SurfaceShape {
 /// beside it is a step and not a slope. A step is the height difference across the cell, from one
 /// side to the other (or to the cell itself where a side has no ground), less the rise that goes on
 /// from cell to cell on either side. Where ground is unknown beside the cell, the first that is
-/// known within `max_filled_gap_m` counts, as high as it lies, if no robot's slope leads there.
+/// known within `max_filled_gap_m` counts, as high as it lies, if no robot's slope leads there: as
+/// a step, or, with less of a slope, as a hidden drop.
 /// @pre the cell's ground is known
 [[nodiscard]] SurfaceShape shape_at(const GroundGrid& ground, int x, int y, double cell_m);
 

@@ -39,6 +39,9 @@ const float* blocking_object(const SurfaceTile::View& surface, const RobotProfil
 
 BlockReason reason_of_ground(const SurfaceCell& cell, const RobotProfile& profile) {
   if (cell.shape.step_m > profile.max_step_m) return BlockReason::step;
+  // Others do not get into what is unknown behind an edge.
+  if (profile.unknown == UnknownGround::allowed && cell.shape.hidden_drop_m > profile.max_step_m)
+    return BlockReason::step;
   if (cell.shape.slope > profile.max_slope_deg * std::numbers::pi / 180.0) {
     return BlockReason::slope;
   }

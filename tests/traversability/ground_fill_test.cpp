@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <vector>
 
 #include "core/traversability/ground_estimate.hpp"
 #include "core/traversability/path_check.hpp"
@@ -200,6 +201,23 @@ TEST(GroundFill, NotOverATrenchOfWhichOnlyTheFarWallWasMeasured) {
             EXPECT_NE(look(*view, x_m, y_m).cell.state, CellState::free)
                 << width_m << " m wide, " << name(wall) << " at " << wall_m << ": " << x_m;
         }
+      }
+    }
+  }
+}
+
+TEST(GroundFill, NoExplorerDrivesOverAPlatformsEdge) {
+  for (const double lower_m : {0.55, 1.1}) {
+    for (const SemanticClass label : {road, unlabeled}) {
+      VoxelWorld world;
+      world.ground(-6, -6, 0, 6, label);
+      const double hidden_m = 2.8 * lower_m;  // seen over the edge from 5 m, 1.8 m above it
+      world.ground(hidden_m, -6, 10, 6, label, [&](double, double) { return 0.1 - lower_m; });
+      const auto view = traversability_of(world.view(), explorer());
+      EXPECT_EQ(look(*view, -0.1, 0.1).cell.reason, BlockReason::step) << lower_m;
+      for (const double y_m : {-2.0, 0.0, 2.0}) {
+        const std::vector<PlanarPose> path{{{-3, y_m}, 0.0}, {{hidden_m + 2, y_m}, 0.0}};
+        EXPECT_FALSE(check_path(*view, path).is_free) << lower_m << " m, " << name(label);
       }
     }
   }

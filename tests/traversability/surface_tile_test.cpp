@@ -142,6 +142,20 @@ TEST(SurfaceShape, ADropBeyondUnknownGroundIsAStepAtBothItsEnds) {
   }
 }
 
+TEST(SurfaceShape, AnEdgeBeyondWhichTheGroundIsSeenFromFarAwayIsAHiddenDrop) {
+  // A platform of 0.55 m, and a slope of 0.2 per metre, behind 1.4 m of what was not seen.
+  for (const double lower_m : {0.55, 0.28}) {
+    GroundGrid ground = ground_of([&](double x, double) { return x < 1.5 ? 0.0 : -lower_m; });
+    for_each_cell(ground, [&](int x, int y) {
+      if (x > middle && x <= middle + 7) ground(x, y) = {};
+    });
+    const SurfaceShape above = shape_in_the_middle(ground);
+    EXPECT_NEAR(above.step_m, 0.0, 1e-5);
+    EXPECT_NEAR(above.hidden_drop_m, lower_m > 0.5 ? lower_m : 0.0, 1e-5);
+    EXPECT_NEAR(shape_at(ground, middle + 8, middle, cell_m).hidden_drop_m, 0.0, 1e-5);
+  }
+}
+
 TEST(SurfaceShape, ASlopeThatGoesOnBeyondUnknownGroundIsNoStep) {
   for (const double rise : {0.45, 0.55, 1.2}) {
     for (const int gap : {2, 5}) {
@@ -150,6 +164,7 @@ TEST(SurfaceShape, ASlopeThatGoesOnBeyondUnknownGroundIsNoStep) {
         if (x > middle && x <= middle + gap) ground(x, y) = {};
       });
       EXPECT_LT(shape_in_the_middle(ground).step_m, 0.1) << rise << ", " << gap;
+      EXPECT_LT(shape_in_the_middle(ground).hidden_drop_m, 0.1) << rise << ", " << gap;
     }
   }
 }
