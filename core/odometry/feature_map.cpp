@@ -90,12 +90,6 @@ class VoxelsAround {
   std::array<std::uint32_t, 8> bricks_;
 };
 
-/// In vector registers, by halves.
-template <std::size_t n>
-float least(const std::array<float, n>& values) {
-  return Eigen::Map<const Eigen::Array<float, static_cast<int>(n), 1>>(values.data()).minCoeff();
-}
-
 }  // namespace
 
 /// The n nearest points so far, nearest first, in words that sort as distances do.
@@ -263,8 +257,6 @@ Neighbours FeatureMap::nearest(const Eigen::Vector3f& position_map, int n,
     const Block& block = blocks_[number];
     for (int first = 0; first < block.count; first += group_size) {
       const auto squared = block.squared_distances(first, position_map);
-      // Once there are n, few groups have a nearer one.
-      if (least(squared) > limit) continue;
       const int count = std::min(group_size, block.count - first);
       for (int k = 0; k < count; ++k) {
         const float distance = squared[static_cast<std::size_t>(k)];
