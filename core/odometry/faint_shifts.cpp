@@ -14,6 +14,9 @@ constexpr double max_faint_share = 0.05;
 constexpr double beside_m = 0.3;
 /// Share of what the features count that must lie worse there.
 constexpr double min_fit_lost = 0.005;
+/// How much wider the kernel is: what moves by a metre between scans still counts less than a
+/// tenth.
+constexpr double wide_kernel_scales = 6.0;
 
 /// Direction of the shift that the scan shows least, along the map's axes.
 std::optional<Eigen::Vector3d> faint_shift(const OdometryResult& found) {
@@ -29,6 +32,29 @@ std::optional<Eigen::Vector3d> faint_shift(const OdometryResult& found) {
 }
 
 }  // namespace
+
+OdometryResult register_with_faint_shifts(const FeatureSets& features, const LocalMap& map,
+                                          const Eigen::Isometry3d& T_map_lidar_predicted,
+                                          const OdometryConfig& config,
+                                          const SweepCorrection& sweep_correction) {
+  const OdometryResult direct =
+      register_features(features, map, T_map_lidar_predicted, config, sweep_correction);
+  const bool is_clear = direct.health == OdometryHealth::lost ||
+                        (direct.health == OdometryHealth::good && !faint_shift(direct));
+  const bool has_kernel = config.registration.robust_scale_m > 0.0 && !config.paper_exact;
+  if (is_clear || !has_kernel || features.sparse_rings) return direct;
+  OdometryConfig wide = config;
+  wide.registration.robust_scale_m *= wide_kernel_scales;
+  wide.registration.plane_deviation_m = wide.registration.sparse_ring_plane_deviation_m = 0.0;
+  const OdometryResult first =
+      register_features(features, map, T_map_lidar_predicted, wide, sweep_correction);
+  if (first.health == OdometryHealth::lost) return direct;
+  OdometryResult second =
+      register_features(features, map, first.T_map_lidar, config, first.sweep_correction);
+  if (second.health == OdometryHealth::lost) return direct;
+  second.iterations += direct.iterations + first.iterations;
+  return second;
+}
 
 OdometryResult doubted_where_shift_fits(OdometryResult found, const FeatureSets& features,
                                         const LocalMap& map, const OdometryConfig& config) {

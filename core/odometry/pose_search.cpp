@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/odometry/expected_poses.hpp"
+#include "core/odometry/faint_shifts.hpp"
 #include "core/odometry/point_alignment.hpp"
 #include "core/odometry/relocalization.hpp"
 #include "core/odometry/scan_features.hpp"
@@ -408,7 +409,7 @@ OdometryResult refined(const OdometryResult& found, const FeatureSets& features,
                        const LocalMap& map, const OdometryConfig& config) {
   if (found.health == OdometryHealth::lost) return found;
   OdometryResult result =
-      register_features(features, map, found.T_map_lidar, config, found.sweep_correction);
+      register_with_faint_shifts(features, map, found.T_map_lidar, config, found.sweep_correction);
   result.iterations += found.iterations;
   return result;
 }

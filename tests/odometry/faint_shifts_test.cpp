@@ -71,6 +71,26 @@ TEST(FaintShifts, AWallAcrossItShowsTheWay) {
   EXPECT_EQ(doubted_where_shift_fits(found, features, map, config).health, OdometryHealth::good);
 }
 
+TEST(FaintShifts, AWayThatThePredictionMissesByMoreThanTheKernelIsFound) {
+  const LocalMap map = map_of(/*end_points=*/40);
+  const FeatureSets features = passage(1.0, /*end_points=*/40, 77);
+  const OdometryConfig config;
+  const Eigen::Isometry3d T_predicted = test::level_pose(1.25, 0.0, 0.0);
+  const OdometryResult direct = register_features(features, map, T_predicted, config);
+  ASSERT_GT(direct.T_map_lidar.translation().x(), 1.15) << "what shows the way is left out";
+  const OdometryResult found = register_with_faint_shifts(features, map, T_predicted, config);
+  EXPECT_NEAR(found.T_map_lidar.translation().x(), 1.0, 0.05);
+}
+
+TEST(FaintShifts, WhereNothingShowsTheWayThePredictionIsKept) {
+  const LocalMap map = map_of(/*end_points=*/0);
+  const FeatureSets features = passage(1.0, /*end_points=*/0, 77);
+  const Eigen::Isometry3d T_predicted = test::level_pose(1.25, 0.0, 0.0);
+  const OdometryResult found =
+      register_with_faint_shifts(features, map, T_predicted, OdometryConfig{});
+  EXPECT_NEAR(found.T_map_lidar.translation().x(), 1.25, 0.1);
+}
+
 TEST(FaintShifts, ThePapersMethodAndWhatIsLostStayAsTheyAre) {
   const LocalMap map = map_of(/*end_points=*/0);
   const FeatureSets features = passage(1.0, /*end_points=*/0, 77);
