@@ -21,6 +21,12 @@ struct Straightened {
   OdometryResult second;
 };
 
+/// What a motion between the scans makes of them, where they fit, and how much speaks for it.
+struct Candidate {
+  std::optional<Straightened> scans;
+  double score = 0.0;
+};
+
 /// The scans that are straightened, and how.
 struct TwoScans {
   const FirstScan& first;
@@ -70,11 +76,8 @@ std::vector<Eigen::Isometry3d> possible_motions(const Eigen::Isometry3d& found, 
   return motions;
 }
 
-/// Rings on the road fit at any speed: what stands up must fit better, too.
-bool fits_better(const OdometryResult& candidate, const OdometryResult& best) {
-  constexpr double clearly = 1.03;
-  return candidate.fit > clearly * best.fit && candidate.upright_fit > clearly * best.upright_fit;
-}
+/// A motion other than the one that was found must score better by this factor.
+constexpr double clearly_better = 1.03;
 
 }  // namespace
 
@@ -100,19 +103,22 @@ void straighten_first_scan(const FirstScan& first, const FeatureSets& features, 
   const TwoScans scans{first, features, interval_s, sweep, config, empty_map};
   const std::vector<Eigen::Isometry3d> motions =
       possible_motions(last.T_map_lidar.inverse() * second.T_map_lidar, interval_s, max_speed_m_s);
-  std::vector<std::optional<Straightened>> found(motions.size());
+  std::vector<Candidate> candidates(motions.size());
   tbb::parallel_for(std::size_t{0}, motions.size(), [&](std::size_t i) {
-    found[i] = straightened(roughly, motions[i], first_rounds);
+    Candidate& candidate = candidates[i];
+    candidate.scans = straightened(roughly, motions[i], first_rounds);
+    if (candidate.scans)
+      candidate.score =
+          score_of_first_motion(candidate.scans->second, features, candidate.scans->map, config);
   });
-  const std::optional<Straightened>* best = found.data();
-  for (const std::optional<Straightened>& candidate : found) {
-    const OdometryResult& to_beat = *best ? (*best)->second : second;
-    const bool is_better = candidate && fits_better(candidate->second, to_beat);
-    if (is_better) best = &candidate;
-  }
-  if (!*best) return;
+  Candidate& as_found = candidates.front();
+  if (!as_found.scans) as_found.score = score_of_first_motion(second, features, map, config);
+  const Candidate* best = &as_found;
+  for (const Candidate& candidate : candidates)
+    if (candidate.scans && candidate.score > clearly_better * best->score) best = &candidate;
+  if (!best->scans) return;
   std::optional<Straightened> result = straightened(
-      scans, (*best)->T_map_first.inverse() * (*best)->second.T_map_lidar, more_rounds);
+      scans, best->scans->T_map_first.inverse() * best->scans->second.T_map_lidar, more_rounds);
   if (!result) return;
   map = std::move(result->map);
   last.T_map_lidar = result->T_map_first;

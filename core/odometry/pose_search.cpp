@@ -396,6 +396,15 @@ bool is_foretold(const OdometryResult& found, const FeatureSets& features, const
          confirmed_by_points(found, features, map, config).health == OdometryHealth::good;
 }
 
+double score_of_first_motion(const OdometryResult& second, const FeatureSets& features,
+                             const LocalMap& map, const OdometryConfig& config) {
+  const PointAlignmentConfig in_place{.max_iterations = 1,
+                                      .without_movable = labels_tell_enough(features, config)};
+  const double points_fit =
+      align_points(features, map.points, second.T_map_lidar, second.sweep_correction, in_place).fit;
+  return second.fit * agreement(second) * points_fit * points_fit;
+}
+
 OdometryResult search_near_prediction(const FeatureSets& features, const LocalMap& map,
                                       const PosePrediction& prediction, const FitStatistics& fits,
                                       const OdometryConfig& config) {

@@ -89,6 +89,13 @@ struct PosePrediction {
                                const LocalMap& map, const PosePrediction& prediction,
                                const FitStatistics& fits, const OdometryConfig& config);
 
+/// How much speaks for the pose of a map's second scan, by two witnesses. The features of two scans
+/// alone may agree on a wrong motion: rings on the road fit at any speed, and so do posts and rails
+/// of which other beams hit other ones. The points then lie much worse on each other.
+[[nodiscard]] double score_of_first_motion(const OdometryResult& second,
+                                           const FeatureSets& features, const LocalMap& map,
+                                           const OdometryConfig& config);
+
 /// From the prediction alone, in two stages where that does not fit: before other starts are tried.
 /// The better of both, found by few features and refined by all. A robust kernel
 /// takes many small steps to a pose that the prediction misses.
