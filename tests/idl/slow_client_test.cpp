@@ -146,7 +146,7 @@ TEST_P(SlowClient, ThatIsStoppedLosesAndIsToldAndNobodyElseNotices) {
   const auto refused = [&] {
     return server_side.service_faults().count("slow_client", large_service);
   };
-  EXPECT_TRUE(test::eventually([&] { return refused() >= min_refused; }));
+  EXPECT_TRUE(test::eventually([&] { return refused() >= min_refused; }, discovery_timeout));
   {
     Participant other_side(loopback(false));
     ServiceClient<SaveMap_Request, SaveMap_Response> other(other_side, large_service);
