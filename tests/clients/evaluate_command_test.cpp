@@ -273,6 +273,18 @@ TEST_F(EvaluateCommandTest, RunsDrivesWithEveryWeightingAndLabelSource) {
   }
 }
 
+TEST_F(EvaluateCommandTest, ComparesPosesAtOtherInstantsOfTheSweepWithTheTruthOfThen) {
+  for (const std::string stamps : {"as_recorded", "end"}) {
+    const ProcessResult result =
+        run("evaluate drives sim:yard,sensor=vlp_16,scans=14,rolling,motion=hard_turns --json "
+            "--stamps " +
+            stamps);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const nlohmann::json row = nlohmann::json::parse(result.out).at(0);
+    EXPECT_LT(row.at("trajectory").at("ate_rmse_m"), 0.015) << stamps;
+  }
+}
+
 TEST_F(EvaluateCommandTest, CountsEveryPoseOfAnotherPlaceAsWrong) {
   const ProcessResult result = run(std::string(short_drive) + " --mutate other_place");
   ASSERT_EQ(result.exit_code, 0) << result.err;

@@ -23,6 +23,7 @@
 #include "config/loaders/model_file.hpp"
 #include "config/loaders/server_config.hpp"
 #include "core/evaluation/drive_mutation.hpp"
+#include "core/odometry/se3.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -73,16 +74,18 @@ void spoil_labels(Scan& scan, const std::string& how, std::size_t index) {
   }
 }
 
-/// Another convention of the points' times; the trajectory must not change.
-void restamp(Scan& scan, const std::string& how, double period_s) {
-  if (scan.time_offset_s.empty() || how == "as_recorded") return;
+/// Another convention of the points' times; the trajectory must not change. Returns how much later
+/// the stamp is [s].
+double restamp(Scan& scan, const std::string& how, double period_s) {
+  if (scan.time_offset_s.empty() || how == "as_recorded") return 0.0;
   if (how == "removed") {
     scan.time_offset_s.clear();
-    return;
+    return 0.0;
   }
   const double shift_s = how == "middle" ? 0.5 * period_s : how == "end" ? period_s : 0.0;
   scan.stamp_ns += std::llround(shift_s * 1e9);
   for (float& offset : scan.time_offset_s) offset -= static_cast<float>(shift_s);
+  return shift_s;
 }
 
 /// Faults of an IMU.
@@ -120,9 +123,19 @@ struct MutatedDrive {
   std::optional<GroundTruthSequence> other_place;
   std::vector<evaluation::MutatedScan> scans;
 
-  [[nodiscard]] std::optional<Eigen::Isometry3d> truth(const evaluation::MutatedScan& scan) const {
+  /// Where the lidar was `later_s` after the stamp of the scan, on the way to the next one.
+  [[nodiscard]] std::optional<Eigen::Isometry3d> truth(const evaluation::MutatedScan& scan,
+                                                       double later_s) const {
     if (scan.of_other_place || sequence.truth.empty()) return std::nullopt;
-    return sequence.truth.at(scan.index);
+    const Eigen::Isometry3d& T_world_lidar = sequence.truth.at(scan.index);
+    if (later_s == 0.0 || sequence.truth.size() < 2) return T_world_lidar;
+    // The last one goes on as it came.
+    const std::size_t from = std::min(scan.index, sequence.truth.size() - 2);
+    const double interval_s =
+        1e-9 * static_cast<double>(sequence.stamps_ns[from + 1] - sequence.stamps_ns[from]);
+    if (!(interval_s > 0.0)) return T_world_lidar;
+    const Eigen::Isometry3d T_step = sequence.truth[from].inverse() * sequence.truth[from + 1];
+    return T_world_lidar * scaled_motion(T_step, later_s / interval_s);
   }
 };
 
@@ -175,14 +188,14 @@ std::vector<DriveResult> run_drive(const MutatedDrive& drive,
         mutated.of_other_place ? *drive.other_place : drive.sequence;
     Scan scan = evaluation::mutate_scan(source.read(mutated.index), mutated);
     spoil_labels(scan, arguments.labels, mutated.index);
-    restamp(scan, arguments.stamps, config.sensor.period_s);
+    const double later_s = restamp(scan, arguments.stamps, config.sensor.period_s);
     labels->next_scan();
     for (const ImuSample& sample : imu.take_up_to_end_of(scan, config.sensor.period_s))
       for (DriveRun& run : runs) run.add(sample);
     for (std::size_t k = 0; k < runs.size(); ++k) {
       // In turn: the first one of a scan finds the caches cold.
       DriveRun& run = runs[(seen + k) % runs.size()];
-      const OdometryResult* found = run.map(scan, drive.truth(mutated));
+      const OdometryResult* found = run.map(scan, drive.truth(mutated, later_s));
       if (!arguments.each) continue;
       std::cerr << seen << " " << run.weighting() << " "
                 << (found != nullptr ? name(found->health) : "rejected");
