@@ -6,9 +6,9 @@
 #include <optional>
 #include <vector>
 
+#include "core/lidar/level_plane.hpp"
 #include "core/lidar/shared_trajectory.hpp"
 #include "core/localization/layered_cells.hpp"
-#include "core/lidar/level_plane.hpp"
 #include "core/map/query/tile_reader.hpp"
 #include "core/map/tile.hpp"
 #include "core/odometry/feature_map.hpp"
