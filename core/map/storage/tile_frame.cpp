@@ -79,7 +79,8 @@ std::vector<std::uint8_t> from_frame(std::span<const std::uint8_t> frame, std::s
   if (frame.empty()) throw TileCodecError("is empty");
   if (std::ranges::find(tile_formats, frame[0]) == tile_formats.end()) {
     throw TileCodecError("has format " + std::to_string(frame[0]) +
-                         ", this program reads formats up to " + std::to_string(tile_formats.back()));
+                         ", this program reads formats up to " +
+                         std::to_string(tile_formats.back()));
   }
   const std::span<const std::uint8_t> packed = frame.subspan(1);
   const unsigned long long size = ZSTD_getFrameContentSize(packed.data(), packed.size());
