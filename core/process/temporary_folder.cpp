@@ -11,6 +11,7 @@
 #include <set>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 namespace stillmap {
@@ -23,14 +24,24 @@ struct FoldersOfProcess {
   std::set<fs::path> paths;
 };
 
-/// The folder, opened and locked: a lock ends with its process however that ends, and is one for
-/// all containers of a machine, whose processes' numbers are not. -1 where another process has it,
-/// or the file system knows no locks of folders.
-int lock(const fs::path& folder, int how) {
-  const int opened = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-  if (opened < 0 || ::flock(opened, how) == 0) return opened;
-  ::close(opened);
-  return -1;
+/// -1, and errno says why, where it cannot be.
+int open_folder(const fs::path& folder) {
+  int opened = -1;
+  do {
+    opened = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+  } while (opened < 0 && errno == EINTR);
+  return opened;
+}
+
+/// A lock ends with its process however that ends, and is one for all containers of a machine,
+/// whose processes' numbers are not. False where another process has it, or the file system knows
+/// no locks of folders.
+bool lock(int opened, int how) {
+  int result = -1;
+  do {
+    result = ::flock(opened, how);
+  } while (result != 0 && errno == EINTR);
+  return result == 0;
 }
 
 /// Whether the folder that was opened is the one that the name leads to.
@@ -56,10 +67,10 @@ void remove_those_of_the_dead(const fs::path& prefix) {
     if (one->path().filename().string().starts_with(name)) found.push_back(one->path());
   }
   for (const fs::path& folder : found) {
-    const int locked = lock(folder, LOCK_EX | LOCK_NB);
-    if (locked < 0) continue;
-    if (is_own(locked)) fs::remove_all(folder, fault);
-    ::close(locked);
+    const int opened = open_folder(folder);
+    if (opened < 0) continue;
+    if (is_own(opened) && lock(opened, LOCK_EX | LOCK_NB)) fs::remove_all(folder, fault);
+    ::close(opened);
   }
 }
 
@@ -70,6 +81,32 @@ fs::path make_folder(const fs::path& prefix) {
                                std::error_code(errno, std::generic_category()));
   }
   return name;
+}
+
+struct HeldFolder {
+  fs::path path;
+  /// -1 where the file system knows no locks: nobody can take it for one of the dead there.
+  int held = -1;
+};
+
+HeldFolder make_held_folder(const fs::path& prefix) {
+  while (true) {
+    fs::path folder = make_folder(prefix);
+    const int opened = open_folder(folder);
+    if (opened < 0) {
+      const std::error_code fault(errno, std::generic_category());
+      // Before it has its lock, another process can take it for one of the dead.
+      if (fault == std::errc::no_such_file_or_directory) continue;
+      // Nor would one that is never locked stay.
+      std::error_code ignored;
+      fs::remove(folder, ignored);
+      throw fs::filesystem_error("cannot hold a folder", folder, fault);
+    }
+    const bool is_locked = lock(opened, LOCK_EX);
+    const bool is_there = is_still(opened, folder);
+    if (!is_locked || !is_there) ::close(opened);
+    if (is_there) return {std::move(folder), is_locked ? opened : -1};
+  }
 }
 
 /// Never destroyed: a signal may come while the program ends.
@@ -89,14 +126,9 @@ TemporaryFolder::TemporaryFolder(const fs::path& prefix, OfTheDead of_the_dead) 
   } else {
     full_prefix += "held-";
     remove_those_of_the_dead(full_prefix);
-    path_ = make_folder(full_prefix);
-    held_ = lock(path_, LOCK_EX);
-    // Before it had its lock, another process could take it for one of the dead.
-    while (held_ >= 0 && !is_still(held_, path_)) {
-      ::close(held_);
-      path_ = make_folder(full_prefix);
-      held_ = lock(path_, LOCK_EX);
-    }
+    HeldFolder made = make_held_folder(full_prefix);
+    path_ = std::move(made.path);
+    held_ = made.held;
   }
   folders.paths.insert(path_);
 }

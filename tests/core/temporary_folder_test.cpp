@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -98,6 +99,50 @@ TEST(TemporaryFolderTest, CopiesOfKilledProcessesGoWithTheNextOneAndThoseOfTheLi
   other.end();
   { const TemporaryFolder own(scratch / "read-", remove); }
   EXPECT_THAT(names_in(scratch), testing::ElementsAre(testing::StartsWith("map.new-")));
+}
+
+/// Between its making and its lock, others may remove it.
+TEST(TemporaryFolderTest, ManyThatAreMadeAtOnceAreThere) {
+  const ScratchFolder scratch;
+  std::vector<pid_t> makers;
+  for (int maker = 0; maker < 8; ++maker) {
+    const pid_t process = fork();
+    if (process != 0) {
+      makers.push_back(process);
+      continue;
+    }
+    bool are_there = true;
+    for (int k = 0; k < 300; ++k) {
+      const TemporaryFolder own(scratch / "read-", TemporaryFolder::OfTheDead::remove);
+      are_there &= fs::exists(own.path());
+    }
+    _exit(are_there ? 0 : 1);
+  }
+  for (const pid_t maker : makers) {
+    int status = -1;
+    waitpid(maker, &status, 0);
+    EXPECT_EQ(status, 0);
+  }
+  EXPECT_TRUE(fs::is_empty(scratch.path()));
+}
+
+TEST(TemporaryFolderTest, NoneIsLeftThatCannotBeHeld) {
+  const ScratchFolder scratch;
+  const pid_t child = fork();
+  if (child == 0) {
+    const rlimit none{0, 0};
+    setrlimit(RLIMIT_NOFILE, &none);
+    try {
+      const TemporaryFolder own(scratch / "read-", TemporaryFolder::OfTheDead::remove);
+    } catch (const fs::filesystem_error& error) {
+      _exit(error.code() == std::errc::too_many_files_open ? 0 : 1);
+    }
+    _exit(2);
+  }
+  int status = -1;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
+  EXPECT_TRUE(fs::is_empty(scratch.path()));
 }
 
 TEST(TemporaryFolderTest, CopiesWithoutALockStay) {
