@@ -320,8 +320,8 @@ std::vector<RemovedVoxel> LiveTile::removed(const VisibilityRule& rule,
 }
 
 std::size_t LiveTile::restore(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
-                              const VisibilityRule& rule) {
-  std::size_t restored = restore_excluded(reason, box_map, rule);
+                              const VisibilityRule& rule, const ScanStamps& stamps) {
+  std::size_t restored = restore_excluded(reason, box_map, rule, stamps);
   for (std::uint32_t position = 0; position < size(); ++position) {
     LiveVoxel& voxel = at(position);
     if (removal(voxel, rule) != reason) continue;
@@ -333,7 +333,7 @@ std::size_t LiveTile::restore(RemovalReason reason, const Eigen::AlignedBox3d& b
 }
 
 std::size_t LiveTile::restore_excluded(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
-                                       const VisibilityRule& rule) {
+                                       const VisibilityRule& rule, const ScanStamps& stamps) {
   std::vector<std::uint32_t> restored;
   for (const auto& [key, excluded] : excluded_) {
     if (reason_of(excluded) != reason || size() >= PositionIndex::max_entries) continue;
@@ -345,6 +345,7 @@ std::size_t LiveTile::restore_excluded(RemovalReason reason, const Eigen::Aligne
     voxel.packed.evidence.add(excluded.label, 1.0F);
     voxel.first_scan = voxel.last_scan = excluded.last_scan;
     voxel.is_restored = 1;
+    first_seen_ns_ = std::min(first_seen_ns_, stamps.stamp_ns(voxel.first_scan));
     restored.push_back(key);
   }
   for (const std::uint32_t key : restored) excluded_.erase(key);

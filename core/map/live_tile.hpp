@@ -116,7 +116,7 @@ class LiveTile {
   /// Shows the voxels that are hidden for this reason, whatever is seen of them later. Returns how
   /// many.
   std::size_t restore(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
-                      const VisibilityRule& rule);
+                      const VisibilityRule& rule, const ScanStamps& stamps);
 
   /// Whether what is published differs by more than a few voxels from what was stored last. A
   /// standing lidar finds a new voxel now and then, at the edge of its noise.
@@ -217,7 +217,7 @@ class LiveTile {
   static void forget_beyond(LiveVoxel& voxel, std::uint32_t max_scans, const VisibilityRule& rule);
   static void exclude(Excluded& voxel, const TilePoint& point, std::uint32_t scan);
   std::size_t restore_excluded(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
-                               const VisibilityRule& rule);
+                               const VisibilityRule& rule, const ScanStamps& stamps);
   [[nodiscard]] static VoxelHistory history(const LiveVoxel& voxel);
   [[nodiscard]] static Thin thin(const LiveVoxel& voxel);
   /// So many misses hide it, and so many for each hit.

@@ -450,7 +450,8 @@ StaticMap::RestoredVoxels StaticMap::restore_removed(RemovalReason reason,
     }
     LiveTile* const tile = state_->tiles.resident(id);
     if (tile == nullptr) continue;
-    const std::size_t voxels = tile->restore(reason, box_map, state_->rule());
+    const std::size_t voxels =
+        tile->restore(reason, box_map, state_->rule(), state_->tiles.stamps());
     if (voxels > 0) state_->tiles.touch(*tile);
     restored.count += voxels;
   }

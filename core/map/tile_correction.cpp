@@ -167,6 +167,7 @@ TileCorrection::Voxel TileCorrection::at_home(const Voxel& voxel) const {
 
 void TileCorrection::put(LiveTile& tile, const Voxel& voxel) const {
   const std::uint32_t key = voxel.live.packed.key;
+  tile.first_seen_ns_ = std::min(tile.first_seen_ns_, stamps_.stamp_ns(voxel.live.first_scan));
   const std::uint32_t position = tile.index_.find(key, tile.key_at());
   if (position != PositionIndex::none) return merge(tile, tile.at(position), voxel);
   if (tile.size() >= PositionIndex::max_entries) return;

@@ -218,7 +218,7 @@ TEST(LiveTile, OfAVoxelThatAFileExcludesTooTheVoxelStays) {
   LiveTile reloaded(live_id, record, live_grid, stamps);
   const Eigen::AlignedBox3d everywhere(Eigen::Vector3d::Constant(-1e3),
                                        Eigen::Vector3d::Constant(1e3));
-  EXPECT_EQ(reloaded.restore(RemovalReason::moving, everywhere, rule), 0U);
+  EXPECT_EQ(reloaded.restore(RemovalReason::moving, everywhere, rule, stamps), 0U);
   (void)reloaded.publish(2, rule, stamps);
   const TileRecord back = reloaded.record(rule, stamps);
   EXPECT_EQ(decode_tile(encode_tile(*back.tile), live_grid).voxels.size(), 1U);
@@ -239,7 +239,7 @@ TEST(LiveTile, ABoxThatBeginsOrEndsWhereARemovedVoxelLiesRestoresIt) {
       const Eigen::Vector3d position_map = voxel.position_map.cast<double>();
       Eigen::AlignedBox3d box_map(position_map);
       box_map.extend(position_map + Eigen::Vector3d::Constant(is_end ? -0.001 : 0.001));
-      EXPECT_EQ(tile.restore(voxel.reason, box_map, rule), 1U) << position_map.transpose();
+      EXPECT_EQ(tile.restore(voxel.reason, box_map, rule, stamps), 1U) << position_map.transpose();
     }
   }
 }

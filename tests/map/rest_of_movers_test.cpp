@@ -84,7 +84,7 @@ TEST_F(RestOfMovers, IsHiddenFromWhatWasSeenThroughOnToAllThatTouches) {
     EXPECT_EQ(voxel.reason, RemovalReason::seen_through);
   const Eigen::AlignedBox3d all(Eigen::Vector3d::Constant(-100.0),
                                 Eigen::Vector3d::Constant(100.0));
-  EXPECT_EQ(tile_->restore(RemovalReason::seen_through, all, movers_rule), 5U);
+  EXPECT_EQ(tile_->restore(RemovalReason::seen_through, all, movers_rule, stamps_), 5U);
   wait(20, {10});
   EXPECT_EQ(shown().size(), 6U);
 }

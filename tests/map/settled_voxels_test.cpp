@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <memory>
 #include <random>
 
+#include "core/map/live_tile.hpp"
 #include "core/map/static_map.hpp"
 
 namespace stillmap {
@@ -90,6 +93,41 @@ TEST_F(SettledVoxelsTest, WhatLabelsTellApartAndThinThingsAreShownWhereverTheyAr
   EXPECT_EQ(see(0.1, SemanticClass::building, false), 0U);
   EXPECT_EQ(see(0.5, SemanticClass::pole, false), 1U);
   EXPECT_EQ(see(0.9, SemanticClass::building, true), 2U);
+}
+
+TEST_F(SettledVoxelsTest, ATileThatACorrectionFillsIsAsOneThatStayed) {
+  see_wall(8.16, 2);
+  const std::size_t before = voxels();
+  // By a tile.
+  const Eigen::Isometry3d T_new_old(Eigen::Translation3d(20.0, 0.0, 0.0));
+  map_.correct(MapCorrection({{0, Eigen::Vector3d::Zero(), T_new_old}}));
+  ASSERT_EQ(voxels(), before);
+  begin_session();
+  see_wall(28.16, 20);
+  EXPECT_LE(voxels(), before + before / 100);
+}
+
+TEST_F(SettledVoxelsTest, SoIsOneWhereOnlyWhatWasRestoredIsKnown) {
+  const VoxelGrid grid(0.2, 20.0);
+  const VisibilityRule rule;
+  const VoxelIndex index{7, 8, 1};
+  TileEvidence evidence;
+  evidence.excluded.push_back({index, SemanticClass::car, true, 5});
+  const TileRecord record{nullptr, std::make_shared<const TileEvidence>(evidence)};
+  ScanStamps stamps;
+  LiveTile tile({}, record, grid, stamps);
+  const Eigen::AlignedBox3d everywhere(Eigen::Vector3d::Constant(-1e3),
+                                       Eigen::Vector3d::Constant(1e3));
+  ASSERT_EQ(tile.restore(RemovalReason::moving, everywhere, rule, stamps), 1U);
+  const SettledVoxels settled{stamps, second_ns, rule};
+  TilePoint point{.voxel_key = voxel_key(index), .offset = {128, 128, 128}, .confidence = 1.0F};
+  for (int scan = 0; scan < 3; ++scan)
+    tile.insert(std::array{point}, stamps.add((2 + scan) * second_ns), &settled);
+  point.voxel_key = voxel_key({8, 8, 1});
+  point.offset[0] = 10;
+  tile.insert(std::array{point}, stamps.add(5 * second_ns), &settled);
+  ASSERT_TRUE(tile.publish(1, rule, stamps));
+  EXPECT_EQ(tile.published()->voxels.size(), 1U);
 }
 
 /// Neither what one scan alone hit, nor what is hidden.
