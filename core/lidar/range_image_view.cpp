@@ -42,14 +42,24 @@ float fast_atan2(float y, float x) {
   return std::copysign(x < 0.0F ? pi - within_quadrant : within_quadrant, y);
 }
 
-/// The same for many, not both of them 0.
+/// The same for many.
 Batch fast_atan2(const Batch& y, const Batch& x) {
-  const Batch larger = x.abs().max(y.abs());
+  const Batch larger = x.abs().max(y.abs()).max(std::numeric_limits<float>::min());
   const Batch smaller = x.abs().min(y.abs());
   Batch angle = small_arc_tangent<Batch>(smaller / larger);
   angle = (y.abs() > x.abs()).select(0.5F * pi - angle, angle);
   angle = (x < 0.0F).select(pi - angle, angle);
   return (y < 0.0F).select(-angle, angle);
+}
+
+/// From 0 to `last`; 0 where NaN, which no whole number is.
+WholeBatch whole(const Batch& share, float last) {
+  WholeBatch result;
+  for (Eigen::Index k = 0; k < batch_size; ++k) {
+    const float at_least_0 = share[k] > 0.0F ? share[k] : 0.0F;
+    result[k] = static_cast<int>(at_least_0 < last ? at_least_0 : last);
+  }
+  return result;
 }
 
 /// Between sparse beams as much is not seen to the sides as above and below.
@@ -174,13 +184,9 @@ RangeImageView::RowRange RangeImageView::project(std::span<const Eigen::Vector3f
   const Batch range_m = (across.square() + z.square()).sqrt();
   const Batch row = (fov_up_ - fast_atan2(z, across)) * rows_per_rad_;
   const Batch column = 0.5F * (1.0F - fast_atan2(y, x) / pi) * static_cast<float>(columns_);
-  const auto whole = [](const Batch& share, int end) -> WholeBatch {
-    return share.max(0.0F).min(static_cast<float>(end - 1)).cast<int>();
-  };
-  const WholeBatch r = whole(row, rows_);
-  const WholeBatch pixel = r * columns_ + whole(column, columns_);
-  const WholeBatch below_row_top =
-      (256.0F * (row - r.cast<float>())).max(0.0F).min(255.0F).cast<int>();
+  const WholeBatch r = whole(row, static_cast<float>(rows_ - 1));
+  const WholeBatch pixel = r * columns_ + whole(column, static_cast<float>(columns_ - 1));
+  const WholeBatch below_row_top = whole(256.0F * (row - r.cast<float>()), 255.0F);
   // Half a row of slack: the outermost beams look along the edge of the field of view.
   const float last_row = static_cast<float>(rows_) + 0.5F;
   RowRange rows;

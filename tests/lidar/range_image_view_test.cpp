@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <random>
@@ -113,6 +114,24 @@ TEST(RangeImageView, LeavesOutWhatIsAboveTheBeamsOrHasNoRange) {
                             is_thin);
   for (const Eigen::Vector3f& point : points.scan.points_lidar) EXPECT_FALSE(view.observe(point));
   EXPECT_EQ(is_thin, std::vector<std::uint8_t>(3, 0));
+}
+
+/// To the zenith all columns are alike; what is no point has none.
+TEST(RangeImageView, HasAPixelForThePointRightAboveAndNoneForNaN) {
+  SensorModel dome = one_degree_lidar();
+  dome.fov_up = 0.5 * std::numbers::pi;
+  dome.fov_down = 0.0;
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  ScatteredPoints points(3);
+  points.scan.points_lidar = {
+      {0.0F, 0.0F, 5.0F}, {nan, nan, nan}, {nan, 1.0F, 1.0F}, {3.0F, 0.0F, nan}};
+  std::vector<std::uint8_t> is_thin;
+  const RangeImageView view(points.scan, dome, Eigen::Isometry3d::Identity(), is_thin);
+  const auto above = view.observe(points.scan.points_lidar[0]);
+  ASSERT_TRUE(above);
+  EXPECT_EQ(above->range_m, 5.0F);
+  for (std::size_t i = 1; i < 4; ++i) EXPECT_FALSE(view.observe(points.scan.points_lidar[i]));
+  EXPECT_EQ(is_thin, std::vector<std::uint8_t>(4, 0));
 }
 
 TEST(RangeImageView, FindsWhatIsThinAsALookAtEveryPixelDoes) {
