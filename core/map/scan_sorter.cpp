@@ -32,7 +32,8 @@ std::span<const ScanSorter::Batch> ScanSorter::sort(const LabelledScan& scan,
                                                     std::span<const std::uint8_t> is_thin) {
   batches_.clear();
   const Eigen::Vector3d lidar_map = T_map_lidar.translation();
-  if (!grid_.holds(lidar_map)) return {};
+  // Of a rotation the norm is the root of 3. Written so that NaN fails.
+  if (!grid_.holds(lidar_map) || !(T_map_lidar.linear().norm() < 2.0)) return {};
   const TileId centre = grid_.index(lidar_map).tile;
   const Window window{{centre.x - reach_tiles_, centre.y - reach_tiles_}, 2 * reach_tiles_ + 1};
   index_points(scan, T_map_lidar, window);
@@ -61,6 +62,15 @@ struct ScanSorter::LanesPlaced {
       p_y[lane] = points_lidar[k].y();
       p_z[lane] = points_lidar[k].z();
     }
+    const Lanes squared_m2 = p_x * p_x + (p_y * p_y + p_z * p_z);
+    const double max_squared_m2 = max_range_m * max_range_m;
+    for (Eigen::Index lane = 0; lane < p_x.size(); ++lane) {
+      // NaN, too: what no whole number holds must not be cast to one.
+      const bool is_far = !(squared_m2[lane] <= max_squared_m2);
+      p_x[lane] = is_far ? 0.0 : p_x[lane];
+      p_y[lane] = is_far ? 0.0 : p_y[lane];
+      p_z[lane] = is_far ? 0.0 : p_z[lane];
+    }
     constexpr double steps = PackedVoxel::offset_steps;
     std::array<Lanes, 3> place, whole;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -75,17 +85,14 @@ struct ScanSorter::LanesPlaced {
     const Lanes y = whole[1] - columns * window.first.y;
     const Lanes row = ((x + 0.5) * (1.0 / columns)).floor();
     const Lanes column = ((y + 0.5) * (1.0 / columns)).floor();
-    const Lanes squared_m2 = p_x * p_x + (p_y * p_y + p_z * p_z);
     const WholeLanes place_in_window = (row * window.side + column).cast<int>();
     const WholeLanes voxel_x = (x - row * columns).cast<int>();
     const WholeLanes voxel_y = (y - column * columns).cast<int>();
     const WholeLanes voxel_z = whole[2].cast<int>();
-    const double max_squared_m2 = max_range_m * max_range_m;
     for (std::size_t k = 0; k < lanes; ++k) {
       const auto lane = static_cast<Eigen::Index>(k);
       const Eigen::Vector3d in_voxels(place[0][lane], place[1][lane], place[2][lane]);
-      // Written so that NaN fails. Only a transform that is not rigid moves a point out of the
-      // window.
+      // Only a transform that is not quite rigid moves a point out of the window.
       const bool is_mapped = (squared_m2[lane] <= max_squared_m2) & (row[lane] >= 0.0) &
                              (row[lane] < window.side) & (column[lane] >= 0.0) &
                              (column[lane] < window.side) &

@@ -22,7 +22,8 @@ class ScanSorter {
     std::span<const TilePoint> points;
   };
 
-  /// Tiles hit by points that are mapped: finite, and within range. The batches are valid until the
+  /// Tiles hit by points that are mapped: finite, and within range; none where the transform is not
+  /// finite and rigid. The batches are valid until the
   /// next call. `is_thin`: of each point (StaticMap::insert), or empty.
   [[nodiscard]] std::span<const Batch> sort(const LabelledScan& scan,
                                             const Eigen::Isometry3d& T_map_lidar,

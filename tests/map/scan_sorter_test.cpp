@@ -89,5 +89,31 @@ TEST(ScanSorter, LeavesOutWhatIsTooHighForTheGrid) {
   EXPECT_EQ(sorter.sort(scan, T_high, {}).size(), 1U);
 }
 
+TEST(ScanSorter, LeavesOutWhatNoWholeNumberHolds) {
+  LabelledScan scan = scattered_points(100, 2);
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  constexpr float huge = std::numeric_limits<float>::max();
+  constexpr float infinite = std::numeric_limits<float>::infinity();
+  const std::vector<float> none{nan, huge, -huge, infinite, -infinite, 1e12F, -1e12F};
+  for (std::size_t i = 0; i < scan.scan.size(); ++i) {
+    scan.scan.points_lidar[i] = {1.0F, 2.0F, 0.5F};
+    if (i > 0) scan.scan.points_lidar[i][static_cast<Eigen::Index>(i % 3)] = none[i % none.size()];
+  }
+  ScanSorter sorter(grid, max_range_m);
+  const auto batches = sorter.sort(scan, Eigen::Isometry3d::Identity(), {});
+  ASSERT_EQ(batches.size(), 1U);
+  EXPECT_EQ(batches[0].points.size(), 1U);
+}
+
+TEST(ScanSorter, PlacesNothingByATransformThatIsNone) {
+  const LabelledScan scan = scattered_points(100, 2);
+  ScanSorter sorter(grid, max_range_m);
+  for (const double scale : {std::numeric_limits<double>::quiet_NaN(), 1e12}) {
+    Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
+    T_map_lidar.linear() *= scale;
+    EXPECT_TRUE(sorter.sort(scan, T_map_lidar, {}).empty());
+  }
+}
+
 }  // namespace
 }  // namespace stillmap
