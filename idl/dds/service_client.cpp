@@ -68,7 +68,8 @@ std::optional<SerializedSample> UntypedServiceClient::call(const SerializedSampl
 }
 
 std::vector<std::string> UntypedServiceClient::who_answers(const void* request,
-                                                           std::chrono::milliseconds timeout) {
+                                                           std::chrono::milliseconds timeout,
+                                                           const std::stop_token& stop) {
   const auto deadline = Clock::now() + timeout;
   sent_.clear();
   send(to_bytes(request_type_, request, 0), {.client = replies_.guid(), .number = ++call_number_});
@@ -76,7 +77,7 @@ std::vector<std::string> UntypedServiceClient::who_answers(const void* request,
   SerializedSample bytes;
   eprosima::fastdds::dds::SampleInfo info;
   while (static_cast<int>(found.size()) < replies_.events().matched_writers() &&
-         replies_.take(bytes, info, {}, left_until(deadline))) {
+         replies_.take(bytes, info, stop, left_until(deadline))) {
     if (!is_ours(info.related_sample_identity)) continue;
     std::ostringstream prefix;
     prefix << info.sample_identity.writer_guid().guidPrefix;

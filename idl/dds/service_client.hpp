@@ -40,10 +40,11 @@ class UntypedServiceClient {
                                                      const std::stop_token& stop);
 
   /// Guid prefixes, as RemoteParticipant::guid, of those that answer this request within `timeout`:
-  /// it is sent once, and all that offer the service are waited for. For requests that change
-  /// nothing.
+  /// it is sent once, and all that offer the service are waited for, until a stop is requested. For
+  /// requests that change nothing.
   [[nodiscard]] std::vector<std::string> who_answers(const void* request,
-                                                     std::chrono::milliseconds timeout);
+                                                     std::chrono::milliseconds timeout,
+                                                     const std::stop_token& stop);
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -124,11 +125,11 @@ class ServiceClient {
   /// As UntypedServiceClient::who_answers; nothing where calls of other threads take all of the
   /// time. Throws NotPermitted.
   [[nodiscard]] std::optional<std::vector<std::string>> who_answers(
-      const Request& request, std::chrono::milliseconds timeout) {
+      const Request& request, std::chrono::milliseconds timeout, const std::stop_token& stop = {}) {
     if (!refusal_.empty()) throw NotPermitted(refusal_);
     const Turn turn(*this, std::chrono::steady_clock::now() + timeout);
     if (!turn.has_come()) return std::nullopt;
-    return client_->who_answers(&request, timeout);
+    return client_->who_answers(&request, timeout, stop);
   }
 
  private:

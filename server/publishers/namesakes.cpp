@@ -40,11 +40,24 @@ std::vector<dds::RemoteParticipant> NamesakeRecord::there(std::vector<dds::Remot
   return known;
 }
 
-void NamesakeRecord::add_answers(const std::vector<std::string>& guids) {
+std::vector<std::string> NamesakeRecord::known() const {
+  std::vector<std::string> guids;
+  for (const auto& [guid, one] : known_) guids.push_back(guid);
+  return guids;
+}
+
+void NamesakeRecord::add_answers(const std::vector<std::string>& asked,
+                                 const std::vector<std::string>& answered) {
+  const auto is_among = [](const std::vector<std::string>& guids, const std::string& guid) {
+    return std::ranges::find(guids, guid) != guids.end();
+  };
   for (auto& [guid, one] : known_) {
-    const bool has_answered = std::ranges::find(guids, guid) != guids.end();
-    one.has_answered = one.has_answered || has_answered;
-    one.vain_questions = has_answered ? 0 : one.vain_questions + 1;
+    if (is_among(answered, guid)) {
+      one.has_answered = true;
+      one.vain_questions = 0;
+    } else if (is_among(asked, guid)) {
+      ++one.vain_questions;
+    }
   }
 }
 
@@ -53,7 +66,7 @@ Namesakes::Namesakes(dds::Participant& participant, std::string name_space)
       name_space_(std::move(name_space)),
       is_told_by_discovery_server_(dds::is_told_by_discovery_server(participant.options())),
       record_(patience_with(participant.options())),
-      worker_("namesakes", question_period, [this](const std::stop_token&) { ask(); }) {}
+      worker_("namesakes", question_period, [this](const std::stop_token& stop) { ask(stop); }) {}
 
 std::vector<dds::RemoteParticipant> Namesakes::among(
     const std::vector<dds::RemoteParticipant>& peers) {
@@ -70,20 +83,20 @@ void Namesakes::make_client() {
   }
 }
 
-void Namesakes::ask() {
-  const bool knows_any = [&] {
+void Namesakes::ask(const std::stop_token& stop) {
+  const std::vector<std::string> asked = [&] {
     const std::scoped_lock lock(mutex_);
-    return record_.knows_any();
+    return record_.known();
   }();
-  if (!knows_any && !is_told_by_discovery_server_) return client_.reset();
+  if (asked.empty() && !is_told_by_discovery_server_) return client_.reset();
   // Found by the others until the next round.
   if (!client_) return make_client();
-  if (!knows_any || !client_->refusal().empty()) return;
+  if (asked.empty() || !client_->refusal().empty()) return;
   stillmap_msgs::srv::GetStatus_Request question;
   question.format_version(dds::wire_format_version);
-  const auto answered = client_->who_answers(question, longest_answer);
+  const auto answered = client_->who_answers(question, longest_answer, stop);
   const std::scoped_lock lock(mutex_);
-  if (answered) record_.add_answers(*answered);
+  if (answered) record_.add_answers(asked, *answered);
 }
 
 }  // namespace stillmap::server

@@ -4,6 +4,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -29,10 +30,10 @@ class NamesakeRecord {
   /// Those of `known`, all that discovery knows now, that are there.
   [[nodiscard]] std::vector<dds::RemoteParticipant> there(std::vector<dds::RemoteParticipant> known,
                                                           TimePoint now);
-  /// A question to all of them was answered by these (guids).
-  void add_answers(const std::vector<std::string>& guids);
-
-  [[nodiscard]] bool knows_any() const { return !known_.empty(); }
+  /// The guids of all that discovery knew last: who is asked next.
+  [[nodiscard]] std::vector<std::string> known() const;
+  /// A question to `asked` was answered by `answered` (guids).
+  void add_answers(const std::vector<std::string>& asked, const std::vector<std::string>& answered);
 
  private:
   struct Known {
@@ -59,7 +60,7 @@ class Namesakes {
       const std::vector<dds::RemoteParticipant>& peers);
 
  private:
-  void ask();
+  void ask(const std::stop_token& stop);
   void make_client();
 
   dds::Participant& participant_;

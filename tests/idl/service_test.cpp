@@ -4,6 +4,7 @@
 #include <functional>
 #include <future>
 #include <stdexcept>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
@@ -157,6 +158,27 @@ TEST(Service, CallsThatWaitForEachOtherKeepTheirTimes) {
       callers.emplace_back([&client] { EXPECT_FALSE(client.call(request_for(""), 500ms)); });
   }
   EXPECT_LT(std::chrono::steady_clock::now() - began, 8s) << "not 20 times as long";
+}
+
+TEST(Service, NoAnswerIsWaitedForAfterAStop) {
+  Participant server_side(loopback(false));
+  std::promise<void> end;
+  const Server server(server_side, "stillmap/save_map",
+                      [ended = end.get_future().share()](const SaveMap_Request& request) {
+                        ended.wait();
+                        return echo(request);
+                      });
+  Participant client_side(loopback(false));
+  Client client(client_side, "stillmap/save_map");
+  ASSERT_TRUE(client.wait_for_server(discovery_timeout));
+  std::stop_source stop;
+  auto answered = std::async(std::launch::async, [&] {
+    return client.who_answers(request_for(""), 60s, stop.get_token());
+  });
+  EXPECT_EQ(answered.wait_for(100ms), std::future_status::timeout);
+  stop.request_stop();
+  EXPECT_EQ(answered.wait_for(10s), std::future_status::ready);
+  end.set_value();
 }
 
 TEST(Service, WhoseThreadFailsLeavesItToWhoRunsIt) {

@@ -23,27 +23,27 @@ constexpr NamesakeRecord::TimePoint begin{1h};
 
 TEST(NamesakeRecordTest, OneCountsAtOnceUntilItIsAskedInVain) {
   NamesakeRecord record(0s);
-  EXPECT_FALSE(record.knows_any());
+  EXPECT_THAT(record.known(), IsEmpty());
   EXPECT_THAT(record.there(servers({"a", "b"}), begin), ElementsAre(is("a"), is("b")));
-  EXPECT_TRUE(record.knows_any());
+  EXPECT_THAT(record.known(), ElementsAre("a", "b"));
   for (int question = 1; question < NamesakeRecord::max_vain_questions; ++question) {
-    record.add_answers({"b"});
+    record.add_answers(record.known(), {"b"});
     EXPECT_THAT(record.there(servers({"a", "b"}), begin), ElementsAre(is("a"), is("b")));
   }
-  record.add_answers({"b"});
+  record.add_answers(record.known(), {"b"});
   EXPECT_THAT(record.there(servers({"a", "b"}), begin), ElementsAre(is("b")));
   // It was only busy.
-  record.add_answers({"a", "b"});
+  record.add_answers(record.known(), {"a", "b"});
   EXPECT_THAT(record.there(servers({"a", "b"}), begin), ElementsAre(is("a"), is("b")));
 }
 
 TEST(NamesakeRecordTest, OneThatMayBeDeadCountsFromItsFirstAnswerOn) {
   NamesakeRecord record(12s);
   EXPECT_THAT(record.there(servers({"dead", "alive"}), begin), IsEmpty());
-  record.add_answers({"alive"});
+  record.add_answers(record.known(), {"alive"});
   EXPECT_THAT(record.there(servers({"dead", "alive"}), begin + 1s), ElementsAre(is("alive")));
-  record.add_answers({"alive"});
-  record.add_answers({"alive"});
+  record.add_answers(record.known(), {"alive"});
+  record.add_answers(record.known(), {"alive"});
   EXPECT_THAT(record.there(servers({"dead", "alive"}), begin + 20s), ElementsAre(is("alive")));
 }
 
@@ -54,14 +54,24 @@ TEST(NamesakeRecordTest, OneThatCannotBeAskedCountsAfterTheLeaseOfTheDead) {
   EXPECT_THAT(record.there(servers({"a"}), begin + 12s), ElementsAre(is("a")));
 }
 
+TEST(NamesakeRecordTest, OneThatCameDuringAQuestionWasNotAsked) {
+  NamesakeRecord record(0s);
+  for (int question = 0; question <= NamesakeRecord::max_vain_questions; ++question) {
+    const std::vector<std::string> asked = record.known();
+    ASSERT_THAT(record.there(servers({"late"}), begin), ElementsAre(is("late")));
+    record.add_answers(asked, {});
+  }
+  EXPECT_THAT(record.there(servers({"late"}), begin), IsEmpty());
+}
+
 TEST(NamesakeRecordTest, ForgetsWhomDiscoveryForgot) {
   NamesakeRecord record(0s);
   ASSERT_THAT(record.there(servers({"a"}), begin), ElementsAre(is("a")));
   for (int question = 0; question < NamesakeRecord::max_vain_questions; ++question)
-    record.add_answers({});
+    record.add_answers(record.known(), {});
   ASSERT_THAT(record.there(servers({"a"}), begin), IsEmpty());
   EXPECT_THAT(record.there({}, begin), IsEmpty());
-  EXPECT_FALSE(record.knows_any());
+  EXPECT_THAT(record.known(), IsEmpty());
   EXPECT_THAT(record.there(servers({"a"}), begin), ElementsAre(is("a")));
 }
 
