@@ -1,9 +1,11 @@
 #include "core/process/file_beside.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <string>
 
 namespace stillmap {
 namespace {
@@ -16,20 +18,28 @@ fs::path real_file(const fs::path& file) {
   return fault ? file : real;
 }
 
-/// Whether a file can be made there, for any reason but room, which the file itself lacks, too.
+/// Whether a file of one's own is or can be made there. Room may lack: the file itself lacks it,
+/// too.
 bool can_be_made(const fs::path& file) {
-  const int made = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
+  const int made = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
   if (made < 0) return errno == ENOSPC || errno == EDQUOT || errno == EIO;
+  struct stat known {};
+  const bool is_own = ::fstat(made, &known) == 0 && known.st_uid == ::geteuid();
   ::close(made);
-  return true;
+  return is_own;
 }
 
 fs::path written_first(const fs::path& real) {
   std::error_code unknown;
   const fs::file_status there = fs::status(real, unknown);
   if (fs::exists(there) && !fs::is_regular_file(there)) return real;
-  fs::path beside = real.string() + ".unfinished";
-  return fs::exists(there) && !can_be_made(beside) ? real : beside;
+  // What a killed process has left is written over by the next: its name is known.
+  const fs::path beside = real.string() + ".unfinished";
+  if (can_be_made(beside)) return beside;
+  // In a folder for everybody another user may have left one.
+  fs::path beside_of_user = beside.string() + "-" + std::to_string(::geteuid());
+  if (can_be_made(beside_of_user)) return beside_of_user;
+  return fs::exists(there) ? real : beside;
 }
 
 }  // namespace
@@ -45,6 +55,9 @@ FileBeside::~FileBeside() {
 std::error_code FileBeside::put_in_place() {
   std::error_code fault;
   if (written_ == file_) return fault;
+  std::error_code ignored;
+  const fs::file_status before = fs::status(file_, ignored);
+  if (fs::is_regular_file(before)) fs::permissions(written_, before.permissions(), ignored);
   fs::rename(written_, file_, fault);
   std::error_code unknown;
   if (fault && fs::exists(file_, unknown)) {

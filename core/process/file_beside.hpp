@@ -5,8 +5,9 @@
 
 namespace stillmap {
 
-/// A file that is written beside the one that it becomes, as FILE.unfinished: one that is there
-/// stays as it is until the new one is whole, also where the process is killed or finds no room.
+/// A file that is written beside the one that it becomes, as FILE.unfinished, or where that is
+/// somebody else's as FILE.unfinished-UID: one that is there stays as it is until the new one is
+/// whole, also where the process is killed or finds no room. The new one gets its permissions.
 /// Where there is no beside (a pipe or device, a file in a folder that takes no other one) it is
 /// the file itself.
 class FileBeside {

@@ -84,6 +84,37 @@ TEST(FileBesideTest, IsTheFileItselfWhereThereIsNoBeside) {
   EXPECT_EQ(content_of(long_name), "after");
 }
 
+TEST(FileBesideTest, KeepsThePermissionsOfTheFileBefore) {
+  const ScratchFolder folder;
+  const fs::path file = folder.file("map.png", "before");
+  const fs::perms shared = fs::perms::owner_read | fs::perms::owner_write | fs::perms::group_read |
+                           fs::perms::group_write;
+  fs::permissions(file, shared);
+  FileBeside beside(file);
+  std::ofstream(beside.path()) << "after";
+  EXPECT_FALSE(beside.put_in_place());
+  EXPECT_EQ(content_of(file), "after");
+  EXPECT_EQ(fs::status(file).permissions(), shared);
+}
+
+TEST(FileBesideTest, WhatIsNotOnesOwnBesideIsLeftAndInNobodysWay) {
+  const ScratchFolder folder;
+  fs::create_directory(folder / "new.png.unfinished");
+  const fs::path foreign = folder.file("other.png.unfinished", "a part");
+  const bool is_foreign = ::chown(foreign.c_str(), 12345, 12345) == 0;
+  for (const char* const name : {"new.png", "other.png"}) {
+    FileBeside beside(folder / name);
+    std::ofstream(beside.path()) << "after";
+    EXPECT_FALSE(beside.put_in_place());
+    EXPECT_EQ(content_of(folder / name), "after");
+  }
+  EXPECT_TRUE(fs::is_directory(folder / "new.png.unfinished"));
+  if (is_foreign) {
+    EXPECT_EQ(content_of(foreign), "a part");
+  }
+  EXPECT_EQ(files_in(folder), is_foreign ? 4 : 3);
+}
+
 TEST(FileBesideTest, SaysWhyThereIsNoPlace) {
   const ScratchFolder folder;
   FileBeside beside(folder / "no" / "map.png");
