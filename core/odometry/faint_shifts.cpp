@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "core/odometry/pose_search.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -42,7 +44,10 @@ OdometryResult register_with_faint_shifts(const FeatureSets& features, const Loc
   const bool is_clear = direct.health == OdometryHealth::lost ||
                         (direct.health == OdometryHealth::good && !faint_shift(direct));
   const bool has_kernel = config.registration.robust_scale_m > 0.0 && !config.paper_exact;
-  if (is_clear || !has_kernel || features.sparse_rings) return direct;
+  // Edges and planes of single rings lie along the way, on whatever rail the ring hits: a wider
+  // kernel has more of them to choose from, and no more that are right.
+  const bool is_by_dense_surfaces = !features.surfaces.empty() && !features.sparse_rings;
+  if (is_clear || !has_kernel || !is_by_dense_surfaces) return direct;
   OdometryConfig wide = config;
   wide.registration.robust_scale_m *= wide_kernel_scales;
   wide.registration.plane_deviation_m = wide.registration.sparse_ring_plane_deviation_m = 0.0;
@@ -52,6 +57,9 @@ OdometryResult register_with_faint_shifts(const FeatureSets& features, const Loc
   OdometryResult second =
       register_features(features, map, first.T_map_lidar, config, first.sweep_correction);
   if (second.health == OdometryHealth::lost) return direct;
+  if (score_of_first_motion(second, features, map, config) <
+      score_of_first_motion(direct, features, map, config))
+    return direct;
   second.iterations += direct.iterations + first.iterations;
   return second;
 }

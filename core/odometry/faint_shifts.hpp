@@ -6,8 +6,10 @@ namespace stillmap {
 
 /// register_features, and where the scan shows a shift by few residuals or none, again from where a
 /// wider kernel leads without the weights of thin planes: those few grow with every scan that keeps
-/// its prediction, until the kernel leaves out just them. Not of the paper's own method, nor
-/// without a kernel, nor by sparse rings, which unlabelled traffic would then take along.
+/// its prediction, until the kernel leaves out just them. The direct result stays where features
+/// and points together speak more for it. Not of the paper's own method, nor without a kernel, nor
+/// by edges and planes of single rings, which gain nothing by it, nor by sparse rings, which
+/// unlabelled traffic would then take along.
 [[nodiscard]] OdometryResult register_with_faint_shifts(
     const FeatureSets& features, const LocalMap& map,
     const Eigen::Isometry3d& T_map_lidar_predicted, const OdometryConfig& config,

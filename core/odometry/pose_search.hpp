@@ -91,7 +91,8 @@ struct PosePrediction {
 
 /// How much speaks for the pose of a map's second scan, by two witnesses. The features of two scans
 /// alone may agree on a wrong motion: rings on the road fit at any speed, and so do posts and rails
-/// of which other beams hit other ones. The points then lie much worse on each other.
+/// of which other beams hit other ones. The points then lie much worse on each other. Of a later
+/// scan it tells which of two registrations is right.
 [[nodiscard]] double score_of_first_motion(const OdometryResult& second,
                                            const FeatureSets& features, const LocalMap& map,
                                            const OdometryConfig& config);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <utility>
 
 #include "core/odometry/scan_features.hpp"
 #include "tests/odometry/poses.hpp"
@@ -80,6 +81,41 @@ TEST(FaintShifts, AWayThatThePredictionMissesByMoreThanTheKernelIsFound) {
   ASSERT_GT(direct.T_map_lidar.translation().x(), 1.15) << "what shows the way is left out";
   const OdometryResult found = register_with_faint_shifts(features, map, T_predicted, config);
   EXPECT_NEAR(found.T_map_lidar.translation().x(), 1.0, 0.05);
+}
+
+TEST(FaintShifts, WhatThePointsDenyIsNotFollowed) {
+  LocalMap map = map_of(/*end_points=*/40);
+  FeatureSets features = passage(1.0, /*end_points=*/40, 77);
+  FeatureSets posts;
+  for (int k = 0; k < 60; ++k)
+    posts.points.push_back(
+        {.position_lidar = Eigen::Vector3f(static_cast<float>(k) - 30.0F, k % 2 == 0 ? 2.0F : -2.0F,
+                                           0.1F * static_cast<float>(k % 7))});
+  extend_local_map(map, posts, Eigen::Isometry3d::Identity(), {});
+  const OdometryConfig config;
+  const Eigen::Isometry3d T_predicted = test::level_pose(1.25, 0.0, 0.0);
+  const auto posts_seen_from = [&](float x_m) {
+    features.points = posts.points;
+    for (FeaturePoint& point : features.points) point.position_lidar.x() -= x_m;
+  };
+  posts_seen_from(1.0F);
+  const OdometryResult found = register_with_faint_shifts(features, map, T_predicted, config);
+  EXPECT_NEAR(found.T_map_lidar.translation().x(), 1.0, 0.05);
+  posts_seen_from(1.25F);
+  const OdometryResult denied = register_with_faint_shifts(features, map, T_predicted, config);
+  EXPECT_GT(denied.T_map_lidar.translation().x(), 1.15);
+}
+
+TEST(FaintShifts, PlanesOfSingleRingsAreSoughtWithNoWiderKernel) {
+  const LocalMap map = map_of(/*end_points=*/40);
+  FeatureSets features = passage(1.0, /*end_points=*/40, 77);
+  const OdometryConfig config;
+  const Eigen::Isometry3d T_predicted = test::level_pose(1.25, 0.0, 0.0);
+  std::swap(features.planes, features.surfaces);
+  const OdometryResult direct = register_features(features, map, T_predicted, config);
+  const OdometryResult found = register_with_faint_shifts(features, map, T_predicted, config);
+  EXPECT_TRUE(found.T_map_lidar.isApprox(direct.T_map_lidar));
+  EXPECT_EQ(found.iterations, direct.iterations);
 }
 
 TEST(FaintShifts, WhereNothingShowsTheWayThePredictionIsKept) {
