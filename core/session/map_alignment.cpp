@@ -137,30 +137,38 @@ bool MapAligner::confirm(const LoopCloser& drive, const Found& a, const Found& b
          angle_of(off) < config_.second_agreement_rad;
 }
 
-bool MapAligner::are_enough(const std::vector<Found>& agreeing, const Found& found) const {
-  if (!leads_to_other_level(found)) return true;
-  const auto place = [](const Found& one) -> Eigen::Vector2d {
-    return one.anchor.T_map_node.translation().head<2>();
+std::vector<std::size_t> MapAligner::confirmed_by(const LoopCloser& drive, const Found& found,
+                                                  const std::vector<Found>& waiting) const {
+  // From one submap to the next odometry drifts by less than is tolerated, on 80 m maybe not: there
+  // it is enough that each agrees with the next.
+  const bool needs_extent = leads_to_other_level(found);
+  std::vector<std::size_t> agreeing;
+  const auto agrees = [&](std::size_t k) {
+    const auto is_next_to = [&](std::size_t later, const Found& one) {
+      return later - k <= config_.agreement_closures && confirm(drive, one, waiting[k]);
+    };
+    return is_next_to(waiting.size(), found) ||
+           (needs_extent && std::ranges::any_of(agreeing, [&](std::size_t other) {
+              return is_next_to(other, waiting[other]);
+            }));
   };
-  return std::ranges::any_of(agreeing, [&](const Found& other) {
-    return (place(other) - place(found)).norm() >= config_.level_extent_m;
-  });
+  for (std::size_t k = waiting.size(); k-- > 0;)
+    if (agrees(k)) agreeing.push_back(k);
+  if (!needs_extent) return agreeing;
+  const auto is_far_enough = [&](std::size_t k) {
+    const Eigen::Vector3d apart =
+        waiting[k].anchor.T_map_node.translation() - found.anchor.T_map_node.translation();
+    return apart.head<2>().norm() >= config_.level_extent_m;
+  };
+  return std::ranges::any_of(agreeing, is_far_enough) ? agreeing : std::vector<std::size_t>{};
 }
 
 std::vector<MapAligner::Found> MapAligner::close(const LoopCloser& drive,
                                                  std::vector<Anchor> anchors,
                                                  MapAlignment& alignment) const {
   std::vector<Found> accepted;
-  // The last ones that jumped, and agree, which wait for another one.
+  // Those that jumped, and wait for others that agree.
   std::vector<Found> waiting;
-  const auto refuse = [&](Found& found, const char* why) {
-    if (why != nullptr) found.closure.refusal = why;
-    alignment.refused.push_back(found.closure);
-  };
-  const auto refuse_waiting = [&] {
-    for (Found& other : waiting) refuse(other, leads_to_other_level(other) ? other_level : alone);
-    waiting.clear();
-  };
   const auto accept = [&](Found found) {
     anchors.push_back(found.anchor);
     accepted.push_back(std::move(found));
@@ -172,20 +180,25 @@ std::vector<MapAligner::Found> MapAligner::close(const LoopCloser& drive,
     std::optional<Found> found = match(drive, next.submap, next.nearest);
     if (!found) continue;
     if (!found->closure.refusal.empty()) {
-      refuse(*found, nullptr);
+      alignment.refused.push_back(std::move(found->closure));
       continue;
     }
-    const bool agrees = !waiting.empty() && confirm(drive, *found, waiting.front());
-    if (jumps(*found) && !(agrees && are_enough(waiting, *found))) {
-      if (!agrees) refuse_waiting();
+    const std::vector<std::size_t> confirmed = confirmed_by(drive, *found, waiting);
+    if (jumps(*found) && confirmed.empty()) {
       waiting.push_back(*std::move(found));
       continue;
     }
-    if (agrees)
-      for (Found& other : std::exchange(waiting, {})) accept(std::move(other));
+    // The last first, so that the numbers of the others stay.
+    for (const std::size_t k : confirmed) {
+      accept(std::move(waiting[k]));
+      waiting.erase(waiting.begin() + static_cast<std::ptrdiff_t>(k));
+    }
     accept(*std::move(found));
   }
-  refuse_waiting();
+  for (Found& other : waiting) {
+    other.closure.refusal = leads_to_other_level(other) ? other_level : alone;
+    alignment.refused.push_back(std::move(other.closure));
+  }
   return accepted;
 }
 

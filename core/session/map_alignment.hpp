@@ -34,12 +34,14 @@ struct MapAlignmentConfig {
   /// How submaps are looked for in the map; and what else odometry may have drifted by.
   EarlierMapConfig earlier;
   /// A closure that is farther than this from where the last one and odometry have it needs a
-  /// second one that agrees to `second_agreement_m` and `second_agreement_rad`.
+  /// second one that agrees to `second_agreement_m` and `second_agreement_rad`, among so many
+  /// before it that jumped.
   double max_single_jump_m = 1.0;
   double second_agreement_m = 0.6;
   double second_agreement_rad = 0.02;
-  /// One that is higher or lower than this needs some that agree with it on so much of the plan:
-  /// see LoopClosingConfig [m].
+  std::size_t agreement_closures = 4;
+  /// One that is higher or lower than this needs some, each of which agrees with the next, on so
+  /// much of the plan: see LoopClosingConfig [m].
   double max_height_jump_m = 1.0;
   double level_extent_m = 80.0;
   /// The drive lies in the map when so many of its submaps do.
@@ -143,8 +145,10 @@ class MapAligner {
   [[nodiscard]] bool leads_to_other_level(const Found& found) const {
     return std::abs(found.height_jump_m) > config_.max_height_jump_m;
   }
-  /// Whether it and those that agree with it are enough to be believed.
-  [[nodiscard]] bool are_enough(const std::vector<Found>& agreeing, const Found& found) const;
+  /// Places in `waiting` of those that it is believed with, the last one first; none where they are
+  /// too few.
+  [[nodiscard]] std::vector<std::size_t> confirmed_by(const LoopCloser& drive, const Found& found,
+                                                      const std::vector<Found>& waiting) const;
   /// Whether both put the drive at the same place.
   [[nodiscard]] bool confirm(const LoopCloser& drive, const Found& a, const Found& b) const;
   [[nodiscard]] std::optional<Found> match(const LoopCloser& drive, std::size_t submap,

@@ -10,20 +10,25 @@
 namespace stillmap {
 namespace {
 
-/// A drive along a stretch; its odometry begins at its first pose, and turns a little too much.
+/// A drive whose odometry begins at its first pose.
 struct StreetDrive {
+  explicit StreetDrive(const StreetWorld& its_world) : world(its_world) {}
+  /// Along a stretch; odometry turns a little too much.
   StreetDrive(const StreetWorld& its_world, double from_m, double to_m, double drift_rad_per_m)
       : world(its_world) {
     const Eigen::Isometry3d drift(Eigen::AngleAxisd(drift_rad_per_m, Eigen::Vector3d::UnitZ()));
-    Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
-    for (double way = from_m; way < to_m; way += 1.0) {
-      const Eigen::Isometry3d T_world_lidar = world.T_map_lidar_at(way, false);
-      if (!T_world_lidars.empty())
-        T_odom_lidar = T_odom_lidar * T_world_lidars.back().inverse() * T_world_lidar * drift;
-      T_world_lidars.push_back(T_world_lidar);
-      closer.add(scan_at(T_world_lidars.size() - 1), T_odom_lidar, true);
-    }
+    for (double way = from_m; way < to_m; way += 1.0)
+      go(world.T_map_lidar_at(way, false), [&](const Eigen::Isometry3d& T) { return T * drift; });
     closer.finish();
+  }
+  /// One scan; `erring` makes of the motion to there what odometry says.
+  template <typename Erring>
+  void go(const Eigen::Isometry3d& T_world_lidar, const Erring& erring) {
+    if (!T_world_lidars.empty())
+      T_odom_lidar =
+          T_odom_lidar * erring(Eigen::Isometry3d(T_world_lidars.back().inverse() * T_world_lidar));
+    T_world_lidars.push_back(T_world_lidar);
+    closer.add(scan_at(T_world_lidars.size() - 1), T_odom_lidar, true);
   }
   [[nodiscard]] LabelledScan scan_at(std::size_t k) const {
     return world.scan_at(T_world_lidars[k], 5000 + k);
@@ -37,6 +42,7 @@ struct StreetDrive {
   const StreetWorld& world;
   LoopCloser closer{LoopClosingConfig{}};
   std::vector<Eigen::Isometry3d> T_world_lidars;
+  Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
 };
 
 /// The map's frame lies elsewhere, and turned.
@@ -73,6 +79,57 @@ TEST(MapAligner, WhatLiesBesideTheMapHangsOnByOdometry) {
   ASSERT_TRUE(alignment.is_recognized()) << alignment.in_words();
   for (std::size_t k = 0; k < alignment.T_map_lidar.size(); ++k)
     EXPECT_LT(error_m(alignment, drive, k), k < 70 ? 0.15 : 0.5) << k;
+}
+
+/// On 70 m of the street, far away, and back for 170 m, when odometry has drifted by a jump in
+/// height. On the way since then its scale is wrong, and its height, from 200 to 222 m, by a hump.
+struct DriveThatComesBack : StreetDrive {
+  DriveThatComesBack(const StreetWorld& its_world, double jump_m, double scale_error, double hump_m)
+      : StreetDrive(its_world) {
+    const auto erring = [](double scale, double up_m) {
+      return [=](Eigen::Isometry3d T) {
+        T.translation() = scale * T.translation() + up_m * Eigen::Vector3d::UnitZ();
+        return T;
+      };
+    };
+    for (int way = 10; way < 80; ++way) go(world.T_map_lidar_at(way, false), erring(1.0, 0.0));
+    go(Eigen::Isometry3d(Eigen::Translation3d(0.0, 400.0, 1.7)), erring(1.0, 0.0));
+    go(world.T_map_lidar_at(120.0, false), erring(1.0, jump_m));
+    for (int way = 121; way < 290; ++way) {
+      const double up_m = way == 200 ? hump_m : way == 222 ? -hump_m : 0.0;
+      go(world.T_map_lidar_at(way, false), erring(1.0 + scale_error, up_m));
+    }
+    closer.finish();
+  }
+};
+
+TEST(MapAligner, OdometryThatIsOffInHeightMayDriftWhileClosuresGather) {
+  const StreetWorld world(1);
+  const SavedMap map = street_map(world, 0.0, 314.0, T_map_world, 1);
+  for (const double scale_error : {0.0, 0.009}) {
+    const DriveThatComesBack drive(world, 1.3, scale_error, 0.0);
+    const MapAlignment alignment = drive.align(map);
+    ASSERT_TRUE(alignment.is_recognized()) << alignment.in_words();
+    EXPECT_GE(alignment.closures.size(), 9U) << scale_error << ": " << alignment.in_words();
+    for (std::size_t k = 0; k < alignment.T_map_lidar.size(); ++k)
+      // Poses on the way there hang on odometry.
+      EXPECT_LT(error_m(alignment, drive, k), 0.3) << scale_error << ", " << k;
+  }
+}
+
+TEST(MapAligner, OneThatDisagreesDoesNotMakeOthersForgotten) {
+  const StreetWorld world(1);
+  const SavedMap map = street_map(world, 0.0, 314.0, T_map_world, 1);
+  const DriveThatComesBack drive(world, 1.3, 0.0, 0.8);
+  const MapAlignment alignment = drive.align(map);
+  ASSERT_TRUE(alignment.is_recognized()) << alignment.in_words();
+  EXPECT_GE(alignment.closures.size(), 8U) << alignment.in_words();
+  for (const MapClosure& closure : alignment.closures)
+    EXPECT_LT(((T_map_world * drive.T_world_lidars[closure.scan]).inverse() * closure.T_map_lidar)
+                  .translation()
+                  .norm(),
+              0.5)
+        << closure.scan;
 }
 
 TEST(MapAligner, AnotherStreetIsNotRecognised) {
