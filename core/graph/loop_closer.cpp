@@ -269,21 +269,29 @@ std::vector<std::size_t> LoopCloser::enough_agreeing(const Candidate& candidate)
   const auto place = [this](const Candidate& c) -> Eigen::Vector3d {
     return graph_.T_map_node[c.edge.to].translation();
   };
-  const Eigen::Vector3d at_map = place(candidate);
-  const Eigen::Isometry3d mine = correction_by(candidate);
+  const auto agree = [&](const Candidate& later, const Candidate& other) {
+    const Eigen::Isometry3d a = correction_by(later);
+    const Eigen::Isometry3d b = correction_by(other);
+    const Eigen::Vector3d at_map = place(later);
+    return later.to != other.to && (a * at_map - b * at_map).norm() <= config_.agreement_m &&
+           angle_of(a.inverse() * b) <= config_.agreement_rad;
+  };
+  // From one submap to the next odometry drifts by less than is tolerated, on 80 m maybe not: there
+  // it is enough that each agrees with the next.
+  const bool needs_extent = leads_to_other_level(candidate);
   std::vector<std::size_t> agreeing;
   double extent_m = 0.0;
-  for (std::size_t k = 0; k < pending_.size(); ++k) {
-    if (pending_[k].to == candidate.to) continue;
-    const Eigen::Isometry3d theirs = correction_by(pending_[k]);
-    const double apart_m = (mine * at_map - theirs * at_map).norm();
-    if (apart_m > config_.agreement_m || angle_of(mine.inverse() * theirs) > config_.agreement_rad)
+  for (std::size_t k = pending_.size(); k-- > 0;) {
+    const auto agrees = [&](std::size_t later) { return agree(pending_[later], pending_[k]); };
+    if (pending_[k].to == candidate.to ||
+        !(agree(candidate, pending_[k]) || (needs_extent && std::ranges::any_of(agreeing, agrees))))
       continue;
     agreeing.push_back(k);
-    extent_m = std::max(extent_m, (place(pending_[k]) - at_map).head<2>().norm());
+    extent_m = std::max(extent_m, (place(pending_[k]) - place(candidate)).head<2>().norm());
   }
+  std::ranges::reverse(agreeing);
   if (agreeing.empty()) return {};
-  if (!leads_to_other_level(candidate)) return {agreeing.front()};
+  if (!needs_extent) return {agreeing.front()};
   return extent_m >= config_.level_extent_m ? agreeing : std::vector<std::size_t>{};
 }
 

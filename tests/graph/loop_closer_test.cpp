@@ -91,6 +91,31 @@ TEST(LoopCloser, AJumpInHeightNeedsMoreOfTheWay) {
   }
 }
 
+TEST(LoopCloser, OdometryMayDriftWhileClosuresOfAJumpInHeightGather) {
+  const StreetWorld world(1);
+  std::vector<Eigen::Isometry3d> truth;
+  Eigen::Isometry3d T_odom_lidar = world.T_map_lidar_at(10.0, false);
+  LoopCloser closer{LoopClosingConfig{}};
+  const auto go = [&](const Eigen::Isometry3d& T, double scale, double up_m) {
+    Eigen::Isometry3d motion = truth.empty() ? Eigen::Isometry3d::Identity()
+                                             : Eigen::Isometry3d(truth.back().inverse() * T);
+    motion.translation() = scale * motion.translation() + up_m * Eigen::Vector3d::UnitZ();
+    T_odom_lidar = T_odom_lidar * motion;
+    truth.push_back(T);
+    closer.add(world.scan_at(T, 5000 + truth.size()), T_odom_lidar, true);
+  };
+  for (int way = 10; way < 290; ++way) go(world.T_map_lidar_at(way, false), 1.0, 0.0);
+  go(Eigen::Isometry3d(Eigen::Translation3d(0.0, 400.0, 1.7)), 1.0, 0.0);
+  go(world.T_map_lidar_at(60.0, false), 1.0, 1.3);
+  for (int way = 61; way < 260; ++way) go(world.T_map_lidar_at(way, false), 1.009, 0.0);
+  closer.finish();
+  EXPECT_GE(closer.closures().size(), 9U);
+  for (const LoopClosure& closure : closer.closures()) {
+    const Eigen::Isometry3d T_from_to = truth[closure.from_scan].inverse() * truth[closure.to_scan];
+    EXPECT_LT((T_from_to.inverse() * closure.T_from_to).translation().norm(), 0.15);
+  }
+}
+
 TEST(LoopCloser, NothingJoinsPlacesOfWhichThatIsDenied) {
   const StreetWorld world(11);
   const Drive two_rounds = drive(world, 1.5 * StreetWorld::length_m, 0.0001, 0.003);
