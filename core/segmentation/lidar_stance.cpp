@@ -33,17 +33,28 @@ double above(const LevelPlane& plane, const Eigen::Vector3f& p) {
   return static_cast<double>(p.z()) - plane.at(p.head<2>().cast<double>());
 }
 
+/// Square metres, row by row.
+constexpr int across = 40;
+
+/// The square metre that a point lies on. Nothing for one on the robot, out of reach, or nowhere.
+std::optional<std::size_t> cell_of(const Eigen::Vector3f& p) {
+  const float squared_m2 = p.head<2>().squaredNorm();
+  if (!(squared_m2 >= nearest_m * nearest_m && squared_m2 < reach_m * reach_m)) return std::nullopt;
+  const Eigen::Vector2i cell = (p.head<2>().array() + reach_m).cast<int>();
+  // A hair within reach the sum is rounded up to all of it.
+  if (cell.minCoeff() < 0 || cell.maxCoeff() >= across) return std::nullopt;
+  return static_cast<std::size_t>(cell.y() * across + cell.x());
+}
+
 /// The lowest point of each square metre: ground nearly everywhere, for it lies below whatever
 /// stands on it, and as much of it far away as near by.
 std::vector<Eigen::Vector3f> lowest_points(std::span<const Eigen::Vector3f> points) {
-  constexpr int across = 40;
   constexpr float nothing_m = std::numeric_limits<float>::infinity();
   std::vector<Eigen::Vector3f> lowest(across * across, Eigen::Vector3f(0.0F, 0.0F, nothing_m));
   for (const Eigen::Vector3f& p : points) {
-    const float squared_m2 = p.head<2>().squaredNorm();
-    if (!(squared_m2 >= nearest_m * nearest_m && squared_m2 < reach_m * reach_m)) continue;
-    const Eigen::Vector2i cell = (p.head<2>().array() + reach_m).cast<int>();
-    Eigen::Vector3f& so_far = lowest[static_cast<std::size_t>(cell.y() * across + cell.x())];
+    const auto cell = cell_of(p);
+    if (!cell) continue;
+    Eigen::Vector3f& so_far = lowest[*cell];
     if (p.z() < so_far.z()) so_far = p;
   }
   std::erase_if(lowest, [](const Eigen::Vector3f& p) { return !p.allFinite(); });

@@ -100,6 +100,19 @@ TEST(LidarStance, NeedsGround) {
   EXPECT_FALSE(stance_over_ground(lowered));
 }
 
+TEST(LidarStance, LeavesOutWhatOnlyJustLiesWithinReach) {
+  // 20 m less a hair, to which 20 m added make 40 m, one square metre too far.
+  std::vector<Eigen::Vector3f> points = Court{}.scan();
+  const float edge_m = std::nextafter(20.0F, 0.0F);
+  for (const float x : {0.0F, 1e-4F}) {
+    points.emplace_back(x, edge_m, -50.0F);
+    points.emplace_back(edge_m, x, -50.0F);
+  }
+  const auto stance = stance_over_ground(points);
+  ASSERT_TRUE(stance);
+  EXPECT_NEAR(stance->height_m, 1.7, 0.03);
+}
+
 TEST(LidarStance, TellsAlongWhichAxesTheBeamsHaveRows) {
   const std::vector<Eigen::Vector3f> leans = Court{.R_world_lidar = leaning(0.0, 6.0)}.scan();
   std::vector<Eigen::Vector3f> level = leans;
