@@ -22,6 +22,12 @@ bool is_vehicle(SemanticClass label) {
   return label >= SemanticClass::car && label <= SemanticClass::other_vehicle;
 }
 
+/// Bicycles and motorcycles lean on walls and fences: they are no islands.
+bool stands_apart(SemanticClass label) {
+  return label == SemanticClass::car || label == SemanticClass::truck ||
+         label == SemanticClass::other_vehicle;
+}
+
 /// Of what stands on the ground and is no vehicle.
 bool is_surroundings(SemanticClass label) {
   return label != SemanticClass::unlabeled && !is_vehicle(label) && !is_ground(label);
@@ -30,17 +36,21 @@ bool is_surroundings(SemanticClass label) {
 struct Votes {
   std::array<float, semantic_class_count> of_class{};
   float all = 0.0F;
+  /// Of those that do not stand between the vehicle and the lidar.
+  float not_before = 0.0F;
   std::uint32_t points = 0;
 
-  void add(SemanticClass label, float confidence) {
+  void add(SemanticClass label, float confidence, bool is_before) {
     of_class[static_cast<std::size_t>(label)] += confidence;
     all += confidence;
+    if (!is_before) not_before += confidence;
     ++points;
   }
   void add(const Votes& other) {
     if (other.points == 0) return;
     for (std::size_t k = 0; k < of_class.size(); ++k) of_class[k] += other.of_class[k];
     all += other.all;
+    not_before += other.not_before;
     points += other.points;
   }
 };
@@ -51,7 +61,7 @@ class Cubes {
   Cubes(std::span<const Eigen::Vector3f> points, double edge_m, const PointLabels& labels)
       : per_m_(static_cast<float>(1.0 / edge_m)), points_(points), labels_(labels) {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      if (!is_vehicle(labels.classes[i])) continue;
+      if (!stands_apart(labels.classes[i])) continue;
       if (const auto key = key_of(points[i]))
         vehicle_points_.push_back({.point = i, .cube = number_of(*key)});
     }
@@ -59,6 +69,7 @@ class Cubes {
     own_.resize(vehicle_cubes_);
     for (const VehiclePoint& p : vehicle_points_) {
       own_[p.cube].votes += labels.confidence[p.point];
+      own_[p.cube].ranges_m += points[p.point].norm();
       ++own_[p.cube].points;
     }
     for (std::size_t k = 0; k < vehicle_cubes_; ++k) {
@@ -79,6 +90,7 @@ class Cubes {
   [[nodiscard]] std::size_t vehicle_cubes() const { return vehicle_cubes_; }
   struct Own {
     float votes = 0.0F;
+    float ranges_m = 0.0F;
     std::uint32_t points = 0;
   };
   [[nodiscard]] const Own& own(std::size_t k) const { return own_[k]; }
@@ -112,7 +124,8 @@ class Cubes {
   [[nodiscard]] std::optional<std::uint64_t> key_of(const Eigen::Vector3f& p) const {
     constexpr float farthest = 1e6F;
     const Eigen::Array3f cell = (p.array() * per_m_).floor();
-    if (!(cell.abs().maxCoeff() < farthest)) return std::nullopt;
+    // Not by the largest, which may leave out one that is no number.
+    if (!(cell.abs() < farthest).all()) return std::nullopt;
     return packed_index(static_cast<std::int64_t>(cell.x()), static_cast<std::int64_t>(cell.y()),
                         static_cast<std::int64_t>(cell.z()));
   }
@@ -124,18 +137,39 @@ class Cubes {
     return entry->second;
   }
 
+  /// How far from the lidar the points of vehicles are in each cube and those beside it [m].
+  [[nodiscard]] std::vector<float> mean_ranges_m() const {
+    std::vector<float> means(keys_.size());
+    for (std::size_t k = 0; k < keys_.size(); ++k) {
+      Own near;
+      const auto add = [&](std::size_t other) {
+        near.ranges_m += own_[other].ranges_m;
+        near.points += own_[other].points;
+      };
+      if (k < vehicle_cubes_) add(k);
+      for (const std::uint64_t side : sides(keys_[k])) {
+        const auto found = numbers_.find(side);
+        if (found != numbers_.end() && found->second < vehicle_cubes_) add(found->second);
+      }
+      means[k] = near.ranges_m / static_cast<float>(near.points);
+    }
+    return means;
+  }
+
   void let_surroundings_vote() {
     // Most points are nowhere near a vehicle: a look at a small table spares them the large one.
     constexpr std::size_t marks = std::size_t{1} << 16;
     std::vector<bool> is_near(marks);
     for (const std::uint64_t key : keys_) is_near[IndexHash()(key) % marks] = true;
+    const std::vector<float> vehicle_m = mean_ranges_m();
     for (std::size_t i = 0; i < points_.size(); ++i) {
       if (!is_surroundings(labels_.classes[i])) continue;
       const auto key = key_of(points_[i]);
       if (!key || !is_near[IndexHash()(*key) % marks]) continue;
       const auto found = numbers_.find(*key);
-      if (found != numbers_.end())
-        around_[found->second].add(labels_.classes[i], labels_.confidence[i]);
+      if (found == numbers_.end()) continue;
+      around_[found->second].add(labels_.classes[i], labels_.confidence[i],
+                                 points_[i].norm() < vehicle_m[found->second]);
     }
   }
 
@@ -201,7 +235,11 @@ class Islands {
   }
 
   [[nodiscard]] Verdict verdict_of(const Cubes::Own& own, const Votes& around) const {
+    // Of a hedge or wall that an island is a part of, about half lies farther away than it; of a
+    // mesh or hedge before a car, next to nothing.
+    constexpr float min_not_before = 0.25F;
     if (!(around.all > 0.0F && around.all >= share_ * own.votes)) return {};
+    if (around.not_before < min_not_before * around.all) return {};
     const auto most = std::ranges::max_element(around.of_class);
     return {.label = static_cast<SemanticClass>(most - around.of_class.begin()),
             .confidence = *most / static_cast<float>(around.points + own.points)};

@@ -68,6 +68,30 @@ TEST(IslandVotes, LeaveACarThatStandsApartOrTouchesAWall) {
   EXPECT_EQ(cloud.labels.confidence, before.confidence);
 }
 
+TEST(IslandVotes, LeaveABicycleThatLeansOnAWall) {
+  for (const SemanticClass label : {SemanticClass::bicycle, SemanticClass::motorcycle}) {
+    LabelledCloud cloud;
+    cloud.add_box({0.0F, 5.0F, -1.6F}, {1.8F, 5.0F, -0.7F}, label);
+    cloud.add_box({-3.0F, 5.1F, -1.7F}, {5.0F, 5.1F, 1.0F}, SemanticClass::building, 0.9F);
+    const PointLabels before = cloud.labels;
+    vote_on_islands(cloud.points, {}, cloud.labels);
+    EXPECT_EQ(cloud.labels.classes, before.classes);
+  }
+}
+
+TEST(IslandVotes, LeaveACarBehindAMesh) {
+  LabelledCloud cloud;
+  cloud.add_box({-2.2F, 8.0F, -1.5F}, {2.2F, 8.0F, -0.2F}, SemanticClass::car);
+  cloud.add_box({-6.0F, 7.8F, -1.7F}, {6.0F, 7.8F, 0.3F}, SemanticClass::fence, 0.8F);
+  const PointLabels before = cloud.labels;
+  vote_on_islands(cloud.points, {}, cloud.labels);
+  EXPECT_EQ(cloud.labels.classes, before.classes);
+  // Where nearly as many lie behind it, it is a part of both.
+  cloud.add_box({-6.0F, 8.2F, -1.7F}, {6.0F, 8.2F, 0.3F}, SemanticClass::fence, 0.8F);
+  vote_on_islands(cloud.points, {}, cloud.labels);
+  EXPECT_EQ(cloud.count(SemanticClass::car), 0U);
+}
+
 TEST(IslandVotes, WeighConfidences) {
   LabelledCloud cloud = hedge_with_a_car_in_it();
   for (std::size_t i = 0; i < cloud.points.size(); ++i)
@@ -92,7 +116,8 @@ TEST(IslandVotes, AreUsedToAnyPoints) {
   LabelledCloud cloud = hedge_with_a_car_in_it();
   const auto nan = std::numeric_limits<float>::quiet_NaN();
   for (const Eigen::Vector3f& p :
-       {Eigen::Vector3f(nan, nan, nan), Eigen::Vector3f(1e9F, 0.0F, 0.0F),
+       {Eigen::Vector3f(nan, nan, nan), Eigen::Vector3f(3.0F, nan, -0.7F),
+        Eigen::Vector3f(1e9F, 0.0F, 0.0F),
         Eigen::Vector3f(0.0F, -std::numeric_limits<float>::infinity(), 0.0F)}) {
     for (const SemanticClass label : {SemanticClass::car, SemanticClass::vegetation}) {
       cloud.points.push_back(p);
@@ -101,7 +126,7 @@ TEST(IslandVotes, AreUsedToAnyPoints) {
     }
   }
   vote_on_islands(cloud.points, {}, cloud.labels);
-  EXPECT_EQ(cloud.count(SemanticClass::car), 3U);
+  EXPECT_EQ(cloud.count(SemanticClass::car), 4U);
   PointLabels none;
   vote_on_islands({}, {}, none);
   EXPECT_TRUE(none.classes.empty());
