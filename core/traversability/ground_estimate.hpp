@@ -72,8 +72,9 @@ inline constexpr double max_filled_gap_m = 6.0;
 ///   - and the far end lies on the extrapolated slopes of both ends: no step in between;
 /// over more than `max_bare_gap_m`, ground in a third direction, near and of that class, must lie
 /// on the same surface. Between ends from which on the ground was measured densely, a gap of more
-/// than 0.9 m is no distance of rings: there only a hole is filled, one that ends within 8 m along
-/// any line through it, and not a strip, which may be water that sends nothing back. Where lines
+/// than 0.9 m is no distance of rings: there only a hole is filled, one that is no longer than 8 m
+/// along any line through it, from what lies within 0.5 m of its level (on the slope around it) to
+/// the next, and not a strip, which may be water that sends nothing back. Where lines
 /// disagree about the height, the cell stays unfilled. Other cells with voxels but without ground
 /// get an `assumed` level. They are a `pit` if they and two cells beside them were measured below
 /// the ground at both ends of a line through them (at its one end, where the other has none), of

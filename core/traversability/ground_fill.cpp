@@ -1,3 +1,4 @@
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -22,6 +23,9 @@ constexpr int min_bank_seen = 4;
 /// of a vehicle, which is no longer in any direction than that [m].
 constexpr double max_strip_m = 0.9;
 constexpr double max_hole_m = 8.0;
+/// What ends a hole lies within so much of the level that the ground round it leads to [m]: not
+/// what hangs over it or is mirrored in it.
+constexpr double hole_end_m = 0.5;
 /// Tolerance of the far end from the extrapolated slopes: constant [m] and per metre of gap.
 constexpr double step_m = 0.06;
 constexpr double slope_doubt = 0.01;
@@ -52,19 +56,24 @@ struct Direction {
 constexpr std::array<Direction, 8> directions{
     {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
 constexpr std::size_t line_count = 4;
-/// Lines to the end of a hole, at most 18 degrees apart: a strip may run anyhow.
-constexpr std::array<Direction, 12> closing_lines{{{1, 0},
-                                                   {3, 1},
-                                                   {2, 1},
+/// Lines to the end of a hole, at most 12 degrees apart: a strip may run anyhow, and one of
+/// `max_strip_m` is longer than `max_hole_m` along the one that is nearest to it.
+constexpr std::array<Direction, 16> closing_lines{{{1, 0},
+                                                   {5, 1},
+                                                   {5, 2},
+                                                   {3, 2},
                                                    {1, 1},
-                                                   {1, 2},
-                                                   {1, 3},
+                                                   {2, 3},
+                                                   {2, 5},
+                                                   {1, 5},
                                                    {0, 1},
-                                                   {-1, 3},
-                                                   {-1, 2},
+                                                   {-1, 5},
+                                                   {-2, 5},
+                                                   {-2, 3},
                                                    {-1, 1},
-                                                   {-2, 1},
-                                                   {-3, 1}}};
+                                                   {-3, 2},
+                                                   {-5, 2},
+                                                   {-5, 1}}};
 
 /// Number of cells to the nearest ground in one direction; 0 without any in reach.
 using Reach = std::int16_t;
@@ -151,10 +160,15 @@ class Holes {
                                          const GroundCell& cell) const;
   /// Whether the ground was measured densely from an end on.
   [[nodiscard]] bool is_bank(const End& end, Direction outwards) const;
-  /// Whether the hole round a cell ends within `max_hole_m` whatever line is followed through it.
-  [[nodiscard]] bool is_enclosed(int x, int y) const;
-  /// Cells from a cell of a hole to where that ends; one more than `limit` where it does not.
-  [[nodiscard]] int cells_to_end(int x, int y, Direction d, int limit) const;
+  /// Rise of the ground round a hole from a level in one of its cells: what the ends in eight
+  /// directions have in common [m per cell].
+  [[nodiscard]] Eigen::Vector2d slope_around(int x, int y, double level_m) const;
+  /// Whether the hole round a cell, where the ground is at a level, ends within `max_hole_m`
+  /// whatever line is followed through it.
+  [[nodiscard]] bool is_enclosed(int x, int y, double level_m) const;
+  /// Cells along a line from a cell of a hole to where that ends; `limit` where it does not.
+  [[nodiscard]] int cells_to_end(int x, int y, double level_m, const Eigen::Vector2d& slope,
+                                 Direction d, int limit) const;
 
   const GroundGrid& seen_;
   const ColumnGrid& columns_;
@@ -271,7 +285,7 @@ std::optional<Holes::Line> Holes::line_through(int x, int y, std::size_t directi
   if (line.gap_m > max_bare_gap_m && !has_third_direction(x, y, direction, line.cell))
     return std::nullopt;
   if (line.gap_m > max_strip_m && is_bank(*a, directions.at(direction)) &&
-      is_bank(*b, directions.at(direction + line_count)) && !is_enclosed(x, y))
+      is_bank(*b, directions.at(direction + line_count)) && !is_enclosed(x, y, height_m))
     return std::nullopt;
   return line;
 }
@@ -286,21 +300,50 @@ bool Holes::is_bank(const End& end, Direction outwards) const {
   return seen >= min_bank_seen;
 }
 
-int Holes::cells_to_end(int x, int y, Direction d, int limit) const {
-  for (int i = 1; i <= limit; ++i) {
-    const int there_x = x + i * d.dx;
-    const int there_y = y + i * d.dy;
-    if (!seen_.contains(there_x, there_y)) break;
-    if (!columns_(there_x, there_y).empty()) return i;
+Eigen::Vector2d Holes::slope_around(int x, int y, double level_m) const {
+  // A little of no slope, for ends in one line only.
+  Eigen::Matrix2d squares = Eigen::Matrix2d::Identity();
+  Eigen::Vector2d products = Eigen::Vector2d::Zero();
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    const std::optional<End> one = end(x, y, i);
+    if (!one) continue;
+    const double rise_m = one->cell->height_m - level_m;
+    if (std::abs(rise_m) > open_fall_slope * one->distance_m) continue;
+    const Eigen::Vector2d offset(one->x - x, one->y - y);
+    squares += offset * offset.transpose();
+    products += offset * rise_m;
   }
-  return limit + 1;
+  return squares.ldlt().solve(products);
 }
 
-bool Holes::is_enclosed(int x, int y) const {
+int Holes::cells_to_end(int x, int y, double level_m, const Eigen::Vector2d& slope, Direction d,
+                        int limit) const {
+  const int longer = std::max(std::abs(d.dx), std::abs(d.dy));
+  for (int i = 1; i < limit; ++i) {
+    // Every cell that the line crosses, not only those on its corners.
+    const double share = static_cast<double>(i) / longer;
+    const Eigen::Vector2i offset(static_cast<int>(std::lround(share * d.dx)),
+                                 static_cast<int>(std::lround(share * d.dy)));
+    if (!seen_.contains(x + offset.x(), y + offset.y())) return limit;
+    const double end_m = level_m + slope.dot(offset.cast<double>());
+    const Column column = columns_(x + offset.x(), y + offset.y());
+    if (std::ranges::any_of(column, [end_m](const ColumnVoxel& voxel) {
+          return std::abs(voxel.height_m - end_m) <= hole_end_m;
+        })) {
+      return i;
+    }
+  }
+  return limit;
+}
+
+bool Holes::is_enclosed(int x, int y, double level_m) const {
+  const Eigen::Vector2d slope = slope_around(x, y, level_m);
   return std::ranges::all_of(closing_lines, [&](const Direction& d) {
-    const int limit = static_cast<int>(max_hole_m / (d.length() * cell_m_));
-    const int ahead = cells_to_end(x, y, d, limit);
-    return ahead + cells_to_end(x, y, {-d.dx, -d.dy}, limit) <= limit;
+    const double length_m = d.length() / std::max(std::abs(d.dx), std::abs(d.dy)) * cell_m_;
+    // Ends lie one cell farther apart than the hole is long.
+    const int longest = static_cast<int>(max_hole_m / length_m) + 1;
+    const int ahead = cells_to_end(x, y, level_m, slope, d, longest);
+    return ahead + cells_to_end(x, y, level_m, slope, {-d.dx, -d.dy}, longest) <= longest;
   });
 }
 

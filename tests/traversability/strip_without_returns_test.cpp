@@ -21,9 +21,12 @@ RobotProfile robot_on(SemanticClass label) {
   return robot;
 }
 
+/// Cells along a tile, so that the window round it is wider than the longest hole.
+constexpr int wide_tile = 100;
+
 /// Level ground, densely seen, but for a strip of water through the origin at an angle to x.
 VoxelWorld canal(double width_m, double angle_rad, SemanticClass label) {
-  VoxelWorld world;
+  VoxelWorld world(wide_tile);
   world.ground(-12, -12, 12, 12, label);
   for (double x_m = -11.9; x_m < 12.0; x_m += 0.2) {
     for (double y_m = -11.9; y_m < 12.0; y_m += 0.2) {
@@ -51,6 +54,66 @@ TEST(StripWithoutReturns, BetweenLevelBanksIsUnknownWhateverItsDirection) {
         EXPECT_FALSE(check_path(*view, path).is_free)
             << name(label) << ", " << width_m << " m, " << angle_deg << " degrees";
       }
+    }
+  }
+}
+
+/// Densely seen road with a rise to x, but for a hole of a length along x and a width.
+VoxelWorld road_with_hole(double length_m, double width_m, double rise = 0.0) {
+  VoxelWorld world(wide_tile);
+  world.ground(-14, -6, 14, 6, road, [rise](double x, double) { return 0.1 + rise * x; });
+  world.clear(-0.5 * length_m, -0.5 * width_m, 0.5 * length_m, 0.5 * width_m);
+  return world;
+}
+
+/// Share of the cells in a rectangle about the origin that are free.
+double free_share(const TraversabilityView& view, double length_m, double width_m) {
+  int free = 0;
+  int all = 0;
+  for (double x = -0.5 * length_m + 0.1; x < 0.5 * length_m; x += 0.2) {
+    for (double y = -0.5 * width_m + 0.1; y < 0.5 * width_m; y += 0.2) {
+      free += look(view, x, y).cell.state == CellState::free ? 1 : 0;
+      ++all;
+    }
+  }
+  return static_cast<double>(free) / all;
+}
+
+TEST(StripWithoutReturns, IsNoLongerThanAVehicleWhereItIsGround) {
+  for (const double rise : {0.0, 0.2}) {
+    for (const double length_m : {4.8, 7.0}) {
+      for (const double width_m : {2.0, 2.8}) {
+        const auto view =
+            traversability_of(road_with_hole(length_m, width_m, rise).view(), square_robot());
+        EXPECT_EQ(free_share(*view, length_m, width_m), 1.0)
+            << length_m << " x " << width_m << " m, rise " << rise;
+      }
+    }
+    const auto lock = traversability_of(road_with_hole(11.0, 2.8, rise).view(), square_robot());
+    EXPECT_LT(free_share(*lock, 8.0, 2.0), 0.01) << rise;
+  }
+}
+
+TEST(StripWithoutReturns, OfOneMetreIsUnknownWhateverItsDirection) {
+  for (int angle_deg = 0; angle_deg <= 90; angle_deg += 3) {
+    const double angle_rad = angle_deg * std::numbers::pi / 180.0;
+    const auto view = traversability_of(canal(1.1, angle_rad, road).view(), square_robot());
+    EXPECT_EQ(look(*view, 0.01, 0.01).cell.state, CellState::unknown) << angle_deg << " degrees";
+  }
+}
+
+TEST(StripWithoutReturns, DoesNotEndUnderBranchesNorAtWhatItMirrors) {
+  for (const double width_m : {2.0, 3.0, 4.0}) {
+    for (const double height_m : {3.0, -1.1}) {
+      VoxelWorld world = canal(width_m, 0.0, road);
+      for (double x_m = -11.0; x_m < 12.0; x_m += 4.0)
+        world.block(x_m, -0.5 * width_m, x_m + 0.2, 0.5 * width_m, height_m, height_m + 0.1,
+                    vegetation);
+      const auto view = traversability_of(world.view(), square_robot());
+      EXPECT_LT(free_share(*view, 16.0, width_m - 0.4), 0.01) << width_m << ", " << height_m;
+      const double north_rad = 0.5 * std::numbers::pi;
+      const std::vector<PlanarPose> path{{{2.1, -4.0}, north_rad}, {{2.1, 4.0}, north_rad}};
+      EXPECT_FALSE(check_path(*view, path).is_free) << width_m << ", " << height_m;
     }
   }
 }
