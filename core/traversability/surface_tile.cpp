@@ -172,6 +172,27 @@ struct BeyondUnknown {
   }
 };
 
+/// Rise per cell from the last ground before a cell on one side, across what is unknown: of single
+/// rows. None through objects, from too near to tell a slope from an edge, or steeper than any
+/// slope.
+double rise_across(const GroundGrid& ground, int x, int y, std::pair<int, int> d, int sign,
+                   double cell_m) {
+  const double length_m = cell_m * std::hypot(d.first, d.second);
+  const int cells = static_cast<int>(max_filled_gap_m / length_m);
+  for (int i = 1; i <= cells; ++i) {
+    const int last_x = x + sign * i * d.first;
+    const int last_y = y + sign * i * d.second;
+    if (!ground.contains(last_x, last_y)) return 0.0;
+    const GroundCell& last = ground(last_x, last_y);
+    if (last.origin == GroundOrigin::assumed || last.origin == GroundOrigin::pit) return 0.0;
+    if (!last.is_known() || i < rise_cells) continue;
+    const double away_m = last.height_m - ground(x, y).height_m;
+    const double rise_m = sign * away_m / i;
+    return std::abs(rise_m) <= unseen_slope * length_m ? rise_m : 0.0;
+  }
+  return 0.0;
+}
+
 /// Nothing where the next cell is known, or none within `max_filled_gap_m`.
 std::optional<BeyondUnknown> beyond_unknown(const GroundGrid& ground, int x, int y,
                                             std::pair<int, int> d, int sign, double cell_m) {
@@ -185,10 +206,13 @@ std::optional<BeyondUnknown> beyond_unknown(const GroundGrid& ground, int x, int
     const bool is_wall =
         ground(x + sign * d.first, y + sign * d.second).origin == GroundOrigin::assumed;
     if (is_wall && *beyond_m > ground(x, y).height_m) return std::nullopt;
+    const double fall_m = ground(x, y).height_m - *beyond_m;
     // A slope goes on beyond the gap as it comes to it.
-    const auto outwards_m = rise_beyond(ground, x, y, d, -sign);
-    const double foreseen_m = outwards_m ? sign * *outwards_m * i : 0.0;
-    return BeyondUnknown{ground(x, y).height_m + foreseen_m - *beyond_m, i * length_m};
+    if (const auto outwards_m = rise_beyond(ground, x, y, d, -sign))
+      return BeyondUnknown{fall_m + sign * *outwards_m * i, i * length_m};
+    // That between single rows may explain what lies there, but not add to it.
+    const double off_m = fall_m + sign * rise_across(ground, x, y, d, -sign, cell_m) * i;
+    return BeyondUnknown{std::abs(off_m) < std::abs(fall_m) ? off_m : fall_m, i * length_m};
   }
   return std::nullopt;
 }

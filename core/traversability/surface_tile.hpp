@@ -30,8 +30,8 @@ struct SurfaceShape {
 /// beside it is a step and not a slope. A step is the height difference across the cell, from one
 /// side to the other (or to the cell itself where a side has no ground), less the rise that goes on
 /// from cell to cell on either side. Where ground is unknown beside the cell, the first that is
-/// known within `max_filled_gap_m` counts, as high as it lies, if no robot's slope leads there: as
-/// a step, or, with less of a slope, as a hidden drop.
+/// known within `max_filled_gap_m` counts, as high as it lies, if no robot's slope leads there (nor
+/// the one before it goes on to there): as a step, or, with less of a slope, as a hidden drop.
 /// @pre the cell's ground is known
 [[nodiscard]] SurfaceShape shape_at(const GroundGrid& ground, int x, int y, double cell_m);
 

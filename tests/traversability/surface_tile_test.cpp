@@ -169,6 +169,30 @@ TEST(SurfaceShape, ASlopeThatGoesOnBeyondUnknownGroundIsNoStep) {
   }
 }
 
+TEST(SurfaceShape, ASlopeOfSingleRowsIsNoHiddenDropAndATerraceOfThemIs) {
+  for (const int apart : {4, 7}) {
+    const auto rows_of = [apart](const std::function<double(double, double)>& height_m) {
+      GroundGrid ground = ground_of(height_m);
+      for_each_cell(ground, [&](int x, int y) {
+        if ((x - middle) % apart != 0) ground(x, y) = {};
+      });
+      return shape_in_the_middle(ground);
+    };
+    for (const double rise : {0.3, 0.4, -0.4}) {
+      const SurfaceShape slope = rows_of([rise](double x, double) { return rise * x; });
+      EXPECT_NEAR(slope.step_m, 0.0, 1e-5) << rise;
+      EXPECT_NEAR(slope.hidden_drop_m, 0.0, 1e-5) << rise;
+    }
+    const double drop_m = 0.45 * apart * cell_m;
+    const SurfaceShape platform =
+        rows_of([&](double x, double) { return x > 0.1 ? -drop_m : 0.0; });
+    EXPECT_NEAR(platform.hidden_drop_m, drop_m, 1e-5);
+    const SurfaceShape stairs =
+        rows_of([&](double x, double) { return -std::round(x / (apart * cell_m)); });
+    EXPECT_NEAR(stairs.step_m, 1.0, 1e-5);
+  }
+}
+
 TEST(SurfaceShape, NoiseOnASlopeIsSeldomAStep) {
   std::mt19937 random(3);
   std::normal_distribution<double> noise_m(0.0, 0.012);
