@@ -343,7 +343,8 @@ bool Holes::is_enclosed(int x, int y, double level_m) const {
     // Ends lie one cell farther apart than the hole is long.
     const int longest = static_cast<int>(max_hole_m / length_m) + 1;
     const int ahead = cells_to_end(x, y, level_m, slope, d, longest);
-    return ahead + cells_to_end(x, y, level_m, slope, {-d.dx, -d.dy}, longest) <= longest;
+    return ahead < longest &&
+           ahead + cells_to_end(x, y, level_m, slope, {-d.dx, -d.dy}, longest) <= longest;
   });
 }
 
