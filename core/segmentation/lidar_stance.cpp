@@ -126,6 +126,46 @@ bool has_another_grade(const LevelPlane& plane, std::span<const Eigen::Vector3f>
   });
 }
 
+/// Whether the ground beside the lidar is on the plane: a road above the fields around it is not on
+/// theirs, nor a level lane in a slope on that of the slope. In each direction the nearest square
+/// metre that is flat along the plane tells; a third of them may be off it, as pavements and roofs
+/// of parked cars are (of real scans up to 5 of 24, a street full of cars 7, roads above fields 14
+/// and more).
+bool holds_beside_lidar(const LevelPlane& plane, std::span<const Eigen::Vector3f> points) {
+  constexpr std::size_t directions = 24, max_off_of = 3;
+  constexpr double on_m = 0.2, flat_m = 0.15, two_pi = 2.0 * std::numbers::pi;
+  constexpr double far_m = std::numeric_limits<double>::infinity();
+  struct Cell {
+    double lowest_m = far_m, highest_m = -far_m;
+  };
+  std::vector<Cell> cells(across * across);
+  for (const Eigen::Vector3f& p : points) {
+    const auto at = cell_of(p);
+    if (!at) continue;
+    const double height_m = above(plane, p);
+    cells[*at].lowest_m = std::min(cells[*at].lowest_m, height_m);
+    cells[*at].highest_m = std::max(cells[*at].highest_m, height_m);
+  }
+  struct Nearest {
+    double range_m = far_m, height_m = 0.0;
+  };
+  std::array<Nearest, directions> nearest;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (!(cells[i].highest_m - cells[i].lowest_m < flat_m && std::isfinite(cells[i].lowest_m)))
+      continue;
+    const double x = static_cast<double>(i % across) + 0.5 - reach_m;
+    const double y = static_cast<double>(i / across) + 0.5 - reach_m;
+    const double turns = std::atan2(y, x) / two_pi + 0.5;
+    const auto direction = static_cast<std::size_t>(turns * directions) % directions;
+    if (const double range_m = std::hypot(x, y); range_m < nearest[direction].range_m)
+      nearest[direction] = {.range_m = range_m, .height_m = cells[i].lowest_m};
+  }
+  const auto is_seen = [](const Nearest& n) { return std::isfinite(n.range_m); };
+  const auto is_off = [](const Nearest& n) { return std::abs(n.height_m) > on_m; };
+  return std::ranges::count_if(nearest, is_off) * static_cast<std::ptrdiff_t>(max_off_of) <=
+         std::ranges::count_if(nearest, is_seen);
+}
+
 /// Entropy of the elevations of points far enough away for them not to matter where exactly the
 /// beams start.
 double entropy_of_elevations(std::span<const Eigen::Vector3f> points) {
@@ -167,7 +207,7 @@ std::optional<LidarStance> stance_over_ground(std::span<const Eigen::Vector3f> p
   if (lowest.size() < min_cells) return std::nullopt;
   const auto plane = fit_level_plane(lowest, max_slope, min_share);
   if (!plane || !is_ground_of(*plane, lowest) || !is_plane_in_both_halves(*plane, lowest) ||
-      has_another_grade(*plane, lowest))
+      has_another_grade(*plane, lowest) || !holds_beside_lidar(*plane, points_lidar))
     return std::nullopt;
   const Eigen::Vector3d normal = normal_of(*plane);
   const double height_m = -plane->height_m * normal.z();

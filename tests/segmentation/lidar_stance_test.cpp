@@ -86,6 +86,50 @@ TEST(LidarStance, IsNotThatAgainstARiseAhead) {
   }
 }
 
+/// Of ground whose height at y is `height_at_m(y)`, for an upright lidar 1.73 m over that at 0, as
+/// 64 beams see it within 60 m.
+template <typename HeightAt>
+std::vector<Eigen::Vector3f> scan_along_road(HeightAt height_at_m) {
+  constexpr double lidar_m = 1.73, reach_m = 60.0, step_m = 0.05;
+  std::vector<Eigen::Vector3f> points;
+  for (int beam = 0; beam < 64; ++beam) {
+    const double slope = std::tan((2.0 - 0.425 * beam) * rad_per_deg);
+    for (int column = 0; column < 360; ++column) {
+      const double azimuth = (column + 0.3) * rad_per_deg;
+      for (double r = 1.0; r < reach_m; r += step_m) {
+        const double y = r * std::sin(azimuth), z = r * slope;
+        if (lidar_m + z > height_at_m(y)) continue;
+        points.push_back(Eigen::Vector3d(r * std::cos(azimuth), y, z).cast<float>());
+        break;
+      }
+    }
+  }
+  return points;
+}
+
+TEST(LidarStance, IsNotThatAgainstTheFieldsBesideARoad) {
+  EXPECT_TRUE(stance_over_ground(scan_along_road([](double) { return 0.0; })));
+  for (const double half_width_m : {3.0, 4.0}) {
+    for (const double lower_m : {0.4, 0.6, 1.0}) {
+      const auto stance = stance_over_ground(scan_along_road([&](double y) {
+        return std::max(-lower_m, -0.5 * std::max(0.0, std::abs(y) - half_width_m));
+      }));
+      EXPECT_NEAR(stance ? stance->height_m : 1.73, 1.73, 0.1) << half_width_m << ' ' << lower_m;
+    }
+  }
+}
+
+TEST(LidarStance, IsNotThatAgainstTheSlopeThatALevelLaneIsIn) {
+  constexpr double half_width_m = 2.0;
+  for (const double slope_deg : {8.0, 10.0}) {
+    const auto stance = stance_over_ground(scan_along_road([&](double y) {
+      const double beside_m = std::max(0.0, std::abs(y) - half_width_m);
+      return std::copysign(std::tan(slope_deg * rad_per_deg) * beside_m, y);
+    }));
+    EXPECT_LT(stance ? stance->tilt_rad : 0.0, 3.0 * rad_per_deg) << slope_deg;
+  }
+}
+
 TEST(LidarStance, NeedsGround) {
   EXPECT_FALSE(stance_over_ground({}));
   const std::vector<Eigen::Vector3f> nothing(
