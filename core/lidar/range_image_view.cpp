@@ -44,6 +44,7 @@ float fast_atan2(float y, float x) {
 
 /// The same for many.
 Batch fast_atan2(const Batch& y, const Batch& x) {
+  // Right above or below the lidar both are 0.
   const Batch larger = x.abs().max(y.abs()).max(std::numeric_limits<float>::min());
   const Batch smaller = x.abs().min(y.abs());
   Batch angle = small_arc_tangent<Batch>(smaller / larger);

@@ -161,5 +161,21 @@ TEST(RangeImageView, FindsWhatIsThinAsALookAtEveryPixelDoes) {
   EXPECT_GT(thin, 200);
 }
 
+TEST(RangeImageViewTest, PointsOnTheLidarsAxisAreInTheImage) {
+  SensorModel sensor = one_degree_lidar();
+  sensor.fov_up = 0.5 * std::numbers::pi;
+  sensor.fov_down = -sensor.fov_up;
+  Scan scan;
+  // As many as are projected at once, and some more.
+  for (int k = 0; k < 600; ++k)
+    scan.points_lidar.emplace_back(0.0F, 0.0F, k % 2 == 0 ? 1.0F : -1.0F);
+  const RangeImageView view(scan, {}, sensor, Eigen::Isometry3d::Identity());
+  for (const float z : {1.0F, -1.0F}) {
+    const auto seen = view.observe({0.0F, 0.0F, z});
+    ASSERT_TRUE(seen) << z;
+    EXPECT_NEAR(seen->range_m, 1.0F, 1e-3F) << z;
+  }
+}
+
 }  // namespace
 }  // namespace stillmap
