@@ -124,6 +124,12 @@ bool RangeImageHistory::sees_through(const RangeImageView& view,
                                                          margin(observation->point_range_m));
 }
 
+bool RangeImageHistory::saw_fixed_at(const Eigen::Vector3f& point_map) const {
+  if (views_.empty()) return false;
+  const auto seen = views_.front().observe(point_map);
+  return seen && !seen->movable && std::abs(seen->range_m - seen->point_range_m) < same_surface_m;
+}
+
 void RangeImageHistory::add(RangeImageView view) {
   views_.push_back(std::move(view));
   const auto kept = static_cast<std::size_t>(config_.range_image_history_size *

@@ -39,7 +39,11 @@ class RangeImageHistory {
   [[nodiscard]] bool sees_through(const RangeImageView& view,
                                   const Eigen::Vector3f& point_map) const;
 
+  /// Whether the oldest view that is kept saw a surface there that cannot move.
+  [[nodiscard]] bool saw_fixed_at(const Eigen::Vector3f& point_map) const;
+
   void add(RangeImageView view);
+  [[nodiscard]] bool is_empty() const { return views_.empty(); }
   /// Views that can be asked, at most `config.range_image_history_size`.
   [[nodiscard]] std::size_t size() const;
   /// How far a place is from that of the oldest view that is kept, where there are as many as may

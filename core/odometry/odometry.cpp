@@ -72,13 +72,15 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   FeatureSets features;
   step.result = state.find_pose(parts, prediction, features);
   state.reclassify_motion(parts, prediction.T_map_lidar, features, step.result);
+  state.judge_what_could_move(parts, prediction, features, step.result);
   state.confirm(features, prediction, step.result);
+  if (state.is_movable_denied && step.result.health == OdometryHealth::good)
+    step.result.health = OdometryHealth::degenerate;
   state.confirm_place(features, prediction, step.result);
   state.begin_anew(features, step.result);
   step.result = doubted_where_pulled(step.result, features, state.map, state.config);
   if (state.fits.are_known())
     step.result = doubted_where_shift_fits(step.result, features, state.map, state.method());
-  state.doubt_what_could_move(parts, step.result);
   state.straighten(features, time_ns, sweep, step.result);
   step.T_map_lidar_middle = step.result.T_map_lidar;
   move_to_middle(scan, sweep, step.result.sweep_correction);

@@ -24,6 +24,10 @@ constexpr double reclassify_angle_rad = 0.01;
 /// they were seen first [m], and where so large a share of their points is on parked ones.
 constexpr double min_proving_way_m = 0.5;
 constexpr double min_parked_share = 0.05;
+/// And unless a smaller share of what stands and cannot move, if there are so many points of it,
+/// was seen at its place.
+constexpr double min_fixed_share = 0.3;
+constexpr int min_fixed_points = 5;
 /// Without them the pose would be farther off than this [m, rad]: they may move.
 constexpr double max_disagreement_m = 0.1;
 constexpr double max_disagreement_rad = 0.01;
@@ -34,6 +38,23 @@ constexpr std::size_t steps_on_near_walls = 40;
 /// The map's z, along the lidar's axes.
 Eigen::Vector3f up_along_lidar(const Eigen::Isometry3d& T_map_lidar) {
   return T_map_lidar.linear().row(2).transpose().cast<float>();
+}
+
+/// Which share of the points that stand up and cannot move the oldest range image saw at their
+/// places, if the lidar is there, 0..1; nothing where hardly any tell.
+std::optional<double> share_seen_before(const ScanInParts& parts, const RangeImageHistory& history,
+                                        const Eigen::Isometry3d& T_map_lidar) {
+  const Eigen::Isometry3f T = T_map_lidar.cast<float>();
+  int all = 0;
+  int seen = 0;
+  for (const std::uint32_t i : parts.features.upright_points) {
+    if (parts.objects.of_point[i] != ObjectClusters::none || is_ground(parts.labels.classes[i]))
+      continue;
+    ++all;
+    seen += history.saw_fixed_at(T * parts.scan.points_lidar[i]) ? 1 : 0;
+  }
+  if (all < min_fixed_points || history.is_empty()) return std::nullopt;
+  return static_cast<double>(seen) / static_cast<double>(all);
 }
 
 }  // namespace
@@ -253,25 +274,33 @@ void Odometry::State::confirm_place(const FeatureSets& features, const PosePredi
   forget_stretch();
 }
 
-void Odometry::State::doubt_what_could_move(const ScanInParts& parts, OdometryResult& result) {
+void Odometry::State::judge_what_could_move(ScanInParts& parts, const PosePrediction& prediction,
+                                            FeatureSets& features, OdometryResult& result) {
   if (!started || result.health == OdometryHealth::lost) return;
-  // Seen where they were by a lidar that has moved, which one that is taken along has not.
-  const double moved_m = history.distance_from_oldest_m(result.T_map_lidar.translation());
-  const bool have_proved = moved_m >= min_proving_way_m && parked_share(parts) >= min_parked_share;
-  if (parts.movable != MovableUse::not_moving || have_proved) {
+  if (parts.movable != MovableUse::not_moving) {
     is_movable_denied = false;
     return;
   }
-  if (result.health != OdometryHealth::good) return;
-  if (!is_movable_denied) {
-    const OdometryResult by_fixed = register_features(
-        fixed_features(parts, config), map, result.T_map_lidar, method(), result.sweep_correction);
-    const PoseTangent off = boxminus(by_fixed.T_map_lidar, result.T_map_lidar);
-    is_movable_denied = by_fixed.health != OdometryHealth::good ||
-                        off.head<3>().norm() > max_disagreement_m ||
-                        off.tail<3>().norm() > max_disagreement_rad;
+  const std::optional<double> seen_before = share_seen_before(parts, history, result.T_map_lidar);
+  if (seen_before && *seen_before < min_fixed_share) {
+    features = fixed_or_parked_features(parts, config);
+    result = estimate_pose(features, prediction);
+    is_movable_denied = true;
+    return;
   }
-  if (is_movable_denied) result.health = OdometryHealth::degenerate;
+  // Seen where they were by a lidar that has moved, which one that is taken along has not.
+  const double moved_m = history.distance_from_oldest_m(result.T_map_lidar.translation());
+  if (seen_before && moved_m >= min_proving_way_m && parked_share(parts) >= min_parked_share) {
+    is_movable_denied = false;
+    return;
+  }
+  if (is_movable_denied) return;
+  const OdometryResult by_fixed = register_features(
+      fixed_features(parts, config), map, result.T_map_lidar, method(), result.sweep_correction);
+  const PoseTangent off = boxminus(by_fixed.T_map_lidar, result.T_map_lidar);
+  is_movable_denied = by_fixed.health != OdometryHealth::good ||
+                      off.head<3>().norm() > max_disagreement_m ||
+                      off.tail<3>().norm() > max_disagreement_rad;
 }
 
 void Odometry::State::begin_anew(const FeatureSets& features, OdometryResult& result) {
@@ -279,7 +308,7 @@ void Odometry::State::begin_anew(const FeatureSets& features, OdometryResult& re
   const bool is_lost_again = lost_scans > 0 && result.health == OdometryHealth::lost;
   if (!has_first_alone || !is_lost_again || !can_begin_map(features, config)) return;
   map.clear();
-  history = RangeImageHistory(config.motion);
+  forget_objects();
   ring_start.clear();
   first_scan.reset();
   started = false;
@@ -301,7 +330,7 @@ void Odometry::State::forget_stretch() {
   fits.forget_point_deviation();
   last = std::move(trusted.last);
   intervals = trusted.intervals;
-  history = RangeImageHistory(config.motion);
+  forget_objects();
   ring_start.clear();
   stretch.reset();
 }
@@ -349,7 +378,8 @@ void Odometry::State::go_on_by_surfaces(const ScanInParts& parts, const Step& st
                                                  up_along_lidar(step.T_map_lidar_middle)),
                     .objects = parts.objects,
                     .motion_classes = parts.motion_classes,
-                    .sparse_rings = has_sparse_rings(sensor)};
+                    .sparse_rings = has_sparse_rings(sensor),
+                    .movable = parts.movable};
   FeatureSets registered = registered_features(again, config);
   FeatureSets latest = registered;
   ring_start.add(std::move(registered), map_features(again, step.motion, config),

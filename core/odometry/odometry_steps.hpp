@@ -127,13 +127,21 @@ struct Odometry::State {
   /// Calls a pose good only where the map says so that is older than any doubt of the place.
   void confirm_place(const FeatureSets& features, const PosePrediction& prediction,
                      OdometryResult& result);
-  /// A pose that rests on what could move is degenerate unless that has proved to stand, or the
-  /// rest agrees: what stands beside the lidar may set off with it.
-  void doubt_what_could_move(const ScanInParts& parts, OdometryResult& result);
+  /// A pose that rests on what could move is denied unless that has proved to stand, or the rest
+  /// agrees: what stands beside the lidar may set off, with it or without. Where the rest was not
+  /// seen where that pose would have it, another one is found without.
+  void judge_what_could_move(ScanInParts& parts, const PosePrediction& prediction,
+                             FeatureSets& features, OdometryResult& result);
   /// Takes this scan for the first one where no other could be registered to that.
   void begin_anew(const FeatureSets& features, OdometryResult& result);
   /// Local map and velocity as they were before the stretch; where its motion led stays known.
   void forget_stretch();
+  /// Range images, and what they told of objects that could move.
+  void forget_objects() {
+    history = RangeImageHistory(config.motion);
+    movable = MovableUse::none;
+    is_movable_denied = false;
+  }
   /// To the covariance of a pose that is not confirmed.
   void add_drift(std::int64_t time_ns, const PosePrediction& prediction, OdometryResult& result);
   [[nodiscard]] SweepPrior sweep_prior(std::int64_t time_ns, const SweepTimes& sweep,

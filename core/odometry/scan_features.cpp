@@ -141,10 +141,15 @@ bool is_little_left(const ScanInParts& parts, const OdometryConfig& config) {
 }  // namespace
 
 FeatureSets registered_features(ScanInParts& parts, const OdometryConfig& config) {
-  parts.movable = is_little_left(parts, config) ? MovableUse::not_moving : MovableUse::none;
+  if (!is_little_left(parts, config)) return fixed_or_parked_features(parts, config);
+  parts.movable = MovableUse::not_moving;
+  return usable_features(parts, parts.movable, config);
+}
+
+FeatureSets fixed_or_parked_features(ScanInParts& parts, const OdometryConfig& config) {
+  parts.movable = MovableUse::none;
   FeatureSets sets = usable_features(parts, parts.movable, config);
-  if (parts.movable == MovableUse::not_moving ||
-      sets.edges.size() + sets.planes.size() + sets.surfaces.size() >= min_static_features)
+  if (sets.edges.size() + sets.planes.size() + sets.surfaces.size() >= min_static_features)
     return sets;
   parts.movable = MovableUse::parked;
   return usable_features(parts, parts.movable, config);

@@ -49,6 +49,10 @@ struct ScanInParts {
 /// ground.
 [[nodiscard]] FeatureSets registered_features(ScanInParts& parts, const OdometryConfig& config);
 
+/// The same without objects that could move and are not parked.
+[[nodiscard]] FeatureSets fixed_or_parked_features(ScanInParts& parts,
+                                                   const OdometryConfig& config);
+
 /// The same without any objects that could move, however little is left.
 [[nodiscard]] FeatureSets fixed_features(const ScanInParts& parts, const OdometryConfig& config);
 
