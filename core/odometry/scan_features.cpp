@@ -21,6 +21,9 @@ constexpr std::size_t min_static_features = 100;
 constexpr double min_share_left = 0.25;
 constexpr double enough_share_left = 0.4;
 
+/// Of fewer that count, no share tells [points].
+constexpr std::size_t min_telling_points = 30;
+
 bool may_be_used(MotionClass motion, MovableUse use) {
   if (use == MovableUse::not_moving) return motion != MotionClass::moving;
   return use == MovableUse::parked && motion == MotionClass::parked;
@@ -131,7 +134,8 @@ bool is_little_left(const ScanInParts& parts, const OdometryConfig& config) {
       ++all;
       left += fixed(i) ? 1 : 0;
     }
-    return static_cast<double>(left) < min_share * static_cast<double>(all);
+    return all >= min_telling_points &&
+           static_cast<double>(left) < min_share * static_cast<double>(all);
   };
   // Under a car the ground seems to stand up, too.
   return is_left_out(parts.features.upright_points, /*counts_ground=*/false) ||

@@ -89,6 +89,12 @@ TEST(RegisteredFeatures, LeaveOutWhatCouldMoveWhereOthersStandBesideIt) {
   EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 100U);
 }
 
+TEST(RegisteredFeatures, LeaveOutWhatCouldMoveWhereHardlyAnyPointsStandUp) {
+  LabelledPoints points(200, 2);
+  for (std::uint32_t i = 0; i < 21; ++i) points.parts.features.upright_points.push_back(i);
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 180U);
+}
+
 TEST(RegisteredFeatures, DoNotCountTheGroundUnderCarsAsStandingUp) {
   LabelledPoints points(200, 10);
   for (std::uint32_t i = 0; i < 200; ++i) points.parts.features.upright_points.push_back(i);
