@@ -128,6 +128,13 @@ std::optional<FittedSurface> fit_surface(const Neighbours& neighbours, double mi
   return line_of(moments);
 }
 
+std::optional<FittedSurface> fit_wide_surface(Neighbours& neighbours, int few,
+                                              double min_plane_width) {
+  if (auto plane = fit_plane(neighbours, min_plane_width)) return plane;
+  neighbours.count = std::min(neighbours.count, few);
+  return fit_surface(neighbours, min_plane_width);
+}
+
 std::optional<FittedSurface> surface_along(const FittedSurface& surface,
                                            const Eigen::Vector3d& tangent_map) {
   if (surface.normal_count == 2) {

@@ -37,6 +37,11 @@ struct FittedSurface {
 [[nodiscard]] std::optional<FittedSurface> fit_surface(
     const Neighbours& neighbours, double min_plane_width = RegistrationConfig{}.min_plane_width);
 
+/// The plane through all neighbours where there is one, else the surface through the nearest `few`,
+/// which alone `neighbours` then holds.
+[[nodiscard]] std::optional<FittedSurface> fit_wide_surface(Neighbours& neighbours, int few,
+                                                            double min_plane_width);
+
 /// The surface as the scan sees it, whose smooth ring runs along `tangent_map` there (length 1, or
 /// zero: not known, and the surface stays as it is). A line across it is one column of a smooth
 /// wall and becomes the plane through both; a plane that leans over the tangent is turned to

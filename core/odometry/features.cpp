@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -157,6 +158,24 @@ std::vector<std::uint32_t> few_surfaces(const Scan& scan, const FeatureConfig& c
                           config.surface_spacing_m * std::sqrt(count / max_surfaces));
 }
 
+double balance_of(std::span<const Eigen::Vector3f> points_lidar,
+                  std::span<const std::uint32_t> chosen) {
+  constexpr std::size_t half = 18;
+  std::array<bool, 2 * half> is_seen{};
+  for (const std::uint32_t i : chosen) {
+    const Eigen::Vector3f& p = points_lidar[i];
+    const double turn = 0.5 + std::atan2(p.y(), p.x()) / (2.0 * std::numbers::pi);
+    is_seen[static_cast<std::size_t>(turn * (2.0 * half)) % (2 * half)] = true;
+  }
+  std::size_t seen = 0;
+  std::size_t opposite = 0;
+  for (std::size_t k = 0; k < 2 * half; ++k) {
+    seen += is_seen[k] ? 1 : 0;
+    opposite += is_seen[k] && is_seen[(k + half) % (2 * half)] ? 1 : 0;
+  }
+  return seen == 0 ? 1.0 : static_cast<double>(opposite) / static_cast<double>(seen);
+}
+
 namespace {
 
 /// Lidars that lean less than this are taken to stand upright: a slope of this much is level
@@ -278,6 +297,7 @@ void pick_points(const Scan& scan, std::vector<std::uint32_t> spaced, double sha
   constexpr std::size_t max_upright = 800;
   constexpr std::size_t max_level = 300;
   features.points = std::move(spaced);
+  features.balance = balance_of(scan.points_lidar, features.points);
   const ColumnHeights columns = upright_columns(scan.points_lidar, features.points, up_lidar);
   std::vector<std::uint32_t> upright, level;
   for (const std::uint32_t i : voxel_downsample(scan.points_lidar, features.points, spacing_m))

@@ -32,7 +32,14 @@ struct Features {
   std::vector<std::uint32_t> level_points;
   /// ring_tangents() of the scan for its `upright_points`; empty where they are not looked at.
   std::vector<Eigen::Vector3f> point_tangents;
+  /// balance_of() the scan's `points`.
+  double balance = 1.0;
 };
+
+/// Which share of the directions round the lidar's z where points lie has points opposite, too,
+/// 0..1; 1 of no points.
+[[nodiscard]] double balance_of(std::span<const Eigen::Vector3f> points_lidar,
+                                std::span<const std::uint32_t> chosen);
 
 /// Whether a lidar's scans are registered by surfaces, as those without rings are, or by the edges
 /// and planes of its rings.

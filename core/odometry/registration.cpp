@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/odometry/registration_limits.hpp"
 #include "core/odometry/sweep_equations.hpp"
 
 namespace stillmap {
@@ -22,6 +23,9 @@ constexpr double coarse_reach_m = 3.0;
 
 /// What a plane counts for a point beyond its neighbours: far walls may be all that shows a motion.
 constexpr double extrapolated_weight = 0.05;
+
+/// Neighbours that make a plane, where they do, of a lidar that looks one way.
+constexpr int wide_neighbours = 10;
 
 struct Correspondence {
   Eigen::Vector3d point_lidar;
@@ -64,12 +68,16 @@ RingLineWeights ring_line_weights(const FeaturePoint& feature, const Registratio
 }
 
 void look_up(const FeaturePoint& feature, FeatureKind kind, const FeatureMap& map,
-             const RegistrationConfig& config, const Eigen::Matrix3d& R_map_lidar,
+             const RegistrationLimits& config, const Eigen::Matrix3d& R_map_lidar,
              Correspondence& found) {
-  const Neighbours neighbours = map.nearest(found.searched_map, config.neighbours,
-                                            static_cast<float>(config.max_neighbour_distance_m));
+  const bool is_wide = config.has_wide_planes && kind == FeatureKind::surface;
+  const int count = is_wide ? std::max(wide_neighbours, config.neighbours) : config.neighbours;
+  Neighbours neighbours =
+      map.nearest(found.searched_map, count, static_cast<float>(config.max_neighbour_distance_m));
   found.in_known_space = neighbours.count > 0;
-  const auto fitted = fit(kind, neighbours, config.min_plane_width);
+  const auto fitted = is_wide
+                          ? fit_wide_surface(neighbours, config.neighbours, config.min_plane_width)
+                          : fit(kind, neighbours, config.min_plane_width);
   const auto surface =
       fitted ? surface_along(*fitted, R_map_lidar * feature.tangent_lidar.cast<double>())
              : std::nullopt;
@@ -90,7 +98,7 @@ void look_up(const FeaturePoint& feature, FeatureKind kind, const FeatureMap& ma
 /// One correspondence a feature, in the features' order whatever the number of threads.
 void find_correspondences(std::span<const FeaturePoint> features, FeatureKind kind,
                           const FeatureMap& map, const OdometryResult& pose,
-                          const RegistrationConfig& config, std::span<Correspondence> found) {
+                          const RegistrationLimits& config, std::span<Correspondence> found) {
   // The map's memory for so many features is on its way while the first of them are looked up.
   constexpr std::size_t ahead = 16;
   const tbb::blocked_range<std::size_t> all(0, features.size(), 128);
@@ -115,7 +123,7 @@ std::size_t count_of(const FeatureSets& features) {
 
 /// Of edges, planes and surfaces, one after the other.
 void find_all_correspondences(const FeatureSets& features, const LocalMap& map,
-                              const OdometryResult& pose, const RegistrationConfig& config,
+                              const OdometryResult& pose, const RegistrationLimits& config,
                               std::span<Correspondence> found) {
   const std::size_t edges = features.edges.size();
   const std::size_t planes = features.planes.size();
@@ -125,15 +133,6 @@ void find_all_correspondences(const FeatureSets& features, const LocalMap& map,
                        found.subspan(edges, planes));
   find_correspondences(features.surfaces, FeatureKind::surface, map.planes, pose, config,
                        found.subspan(edges + planes));
-}
-
-RegistrationConfig limits_for(const FeatureSets& features, RegistrationConfig limits) {
-  if (!features.sparse_rings) return limits;
-  limits.neighbours = limits.sparse_ring_neighbours;
-  limits.min_plane_width = limits.sparse_ring_plane_width;
-  limits.plane_deviation_m = limits.sparse_ring_plane_deviation_m;
-  limits.across_rings_weight = 0.0;
-  return limits;
 }
 
 /// Sum of w s s' over slopes s, in columns of eight numbers: whole vector registers.
@@ -385,7 +384,7 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
                                  const Eigen::Isometry3d& T_map_lidar_predicted,
                                  const OdometryConfig& config,
                                  const SweepCorrection& sweep_correction) {
-  const RegistrationConfig limits = limits_for(features, config.registration);
+  const RegistrationLimits limits = limits_for(features, config.registration);
   OdometryResult result;
   result.T_map_lidar = T_map_lidar_predicted;
   result.sweep_correction = sweep_correction;

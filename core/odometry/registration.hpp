@@ -57,6 +57,9 @@ struct FeatureSets {
   /// The local map's points lie along beams so far apart that
   /// `RegistrationConfig::sparse_ring_neighbours` make a surface.
   bool sparse_rings = false;
+  /// Which share of the directions where the scan shows something has something opposite, 0..1: all
+  /// of a lidar that looks all round, none of one that looks ahead.
+  double balance = 1.0;
 };
 
 /// The local map's feature sets M_e and M_p, and points of any kind for the alignment of points.

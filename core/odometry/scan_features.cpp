@@ -115,7 +115,8 @@ FeatureSets usable_features(const ScanInParts& parts, MovableUse use,
           .level_points = points.of(parts.features.level_points, all_points),
           .rolling = points.rolling(),
           .sweep_prior = parts.sweep_prior,
-          .sparse_rings = parts.sparse_rings};
+          .sparse_rings = parts.sparse_rings,
+          .balance = config.paper_exact ? 1.0 : parts.features.balance};
 }
 
 /// Whether without what could move hardly anything that stands up would be left, or of the ground,

@@ -193,6 +193,23 @@ TEST(HasSparseRings, TellsLidarsByTheAngleBetweenTheirRings) {
   EXPECT_FALSE(has_sparse_rings(half)) << "it has none";
 }
 
+TEST(BalanceOf, IsTheShareOfDirectionsWithSomethingOpposite) {
+  const auto balance = [](double span_degrees) {
+    std::vector<Eigen::Vector3f> points;
+    for (double azimuth = 0.5; azimuth < span_degrees; azimuth += 1.0)
+      points.emplace_back(10.0F * std::cos(azimuth * degree), 10.0F * std::sin(azimuth * degree),
+                          1.0F);
+    std::vector<std::uint32_t> all(points.size());
+    std::iota(all.begin(), all.end(), 0U);
+    return balance_of(points, all);
+  };
+  EXPECT_EQ(balance(360.0), 1.0);
+  EXPECT_NEAR(balance(270.0), 2.0 / 3.0, 0.01);
+  EXPECT_EQ(balance(180.0), 0.0);
+  EXPECT_EQ(balance(90.0), 0.0);
+  EXPECT_EQ(balance(0.0), 1.0) << "nothing is seen";
+}
+
 TEST(RingCurvature, IsTheSquaredSumOfTenDifferences) {
   const Scan scan = ring_scan(-5.0 * degree, 5.0 * degree, [](double azimuth) {
     return 5.0 / (std::cos(azimuth) - std::abs(std::sin(azimuth)));

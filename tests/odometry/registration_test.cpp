@@ -6,6 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <random>
 
+#include "core/odometry/registration_limits.hpp"
 #include "core/odometry/scan_features.hpp"
 #include "tests/odometry/poses.hpp"
 #include "tests/odometry/surface_world.hpp"
@@ -165,6 +166,21 @@ TEST(RegisterFeatures, ColumnsOnSmoothWallsDoNotSayThatTheLidarStands) {
   EXPECT_NEAR(x_found(columns_of_walls(Eigen::Vector3f::UnitX())), 0.2, 0.02);
   EXPECT_LT(x_found(columns_of_walls(Eigen::Vector3f::Zero())), 0.1)
       << "columns that may be posts do say so";
+}
+
+TEST(LimitsFor, LinesAlongRingsCountLessTheLessIsOpposite) {
+  const RegistrationConfig config;
+  const auto limits = [&](double balance) {
+    FeatureSets features;
+    features.balance = balance;
+    return limits_for(features, config);
+  };
+  EXPECT_EQ(limits(1.0).across_rings_weight, config.across_rings_weight);
+  EXPECT_EQ(limits(0.5).across_rings_weight, config.across_rings_weight);
+  EXPECT_EQ(limits(0.25).across_rings_weight, 0.5 * config.across_rings_weight);
+  EXPECT_EQ(limits(0.0).across_rings_weight, 0.0);
+  EXPECT_FALSE(limits(0.5).has_wide_planes);
+  EXPECT_TRUE(limits(0.25).has_wide_planes);
 }
 
 TEST(RegisterFeatures, NothingButRingsOnLevelGroundIsDegenerate) {
