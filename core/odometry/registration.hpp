@@ -58,7 +58,7 @@ struct FeatureSets {
   /// `RegistrationConfig::sparse_ring_neighbours` make a surface.
   bool sparse_rings = false;
   /// Which share of the directions where the scan shows something has something opposite, 0..1: all
-  /// of a lidar that looks all round, none of one that looks ahead.
+  /// of a lidar that looks all round, or has no rings, none of one whose rings look ahead.
   double balance = 1.0;
 };
 

@@ -108,6 +108,8 @@ FeatureSets usable_features(const ScanInParts& parts, MovableUse use,
   if (!parts.features.point_tangents.empty())
     for (std::size_t k = 0; k < upright.size(); ++k)
       upright[k].tangent_lidar = parts.features.point_tangents[parts.features.upright_points[k]];
+  // Points that are not measured in rows do not take the pitch along.
+  const bool has_rows = !parts.scan.ring.empty() && !config.paper_exact;
   return {.edges = points.of(parts.features.edges, usable),
           .planes = points.of(parts.features.registered_planes, usable),
           .surfaces = points.of(parts.features.surfaces, usable),
@@ -116,7 +118,7 @@ FeatureSets usable_features(const ScanInParts& parts, MovableUse use,
           .rolling = points.rolling(),
           .sweep_prior = parts.sweep_prior,
           .sparse_rings = parts.sparse_rings,
-          .balance = config.paper_exact ? 1.0 : parts.features.balance};
+          .balance = has_rows ? parts.features.balance : 1.0};
 }
 
 /// Whether without what could move hardly anything that stands up would be left, or of the ground,
