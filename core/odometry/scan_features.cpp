@@ -108,8 +108,10 @@ FeatureSets usable_features(const ScanInParts& parts, MovableUse use,
   if (!parts.features.point_tangents.empty())
     for (std::size_t k = 0; k < upright.size(); ++k)
       upright[k].tangent_lidar = parts.features.point_tangents[parts.features.upright_points[k]];
-  // Points that are not measured in rows do not take the pitch along.
-  const bool has_rows = !parts.scan.ring.empty() && !config.paper_exact;
+  // Points that are not measured in rows do not take the pitch along, nor do edges and planes of
+  // single rings: these keep what holds them up.
+  const bool has_rows =
+      !parts.scan.ring.empty() && !parts.features.surfaces.empty() && !config.paper_exact;
   return {.edges = points.of(parts.features.edges, usable),
           .planes = points.of(parts.features.registered_planes, usable),
           .surfaces = points.of(parts.features.surfaces, usable),
