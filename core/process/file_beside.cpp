@@ -21,10 +21,15 @@ fs::path real_file(const fs::path& file) {
 /// Whether a file of one's own is or can be made there. Room may lack: the file itself lacks it,
 /// too.
 bool can_be_made(const fs::path& file) {
-  const int made = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+  constexpr int how = O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
+  // What is made here is one's own, whatever owner the file system tells.
+  int made = ::open(file.c_str(), how | O_EXCL, 0666);
+  const bool is_new = made >= 0;
+  if (!is_new && errno == EEXIST) made = ::open(file.c_str(), how, 0666);
   if (made < 0) return errno == ENOSPC || errno == EDQUOT || errno == EIO;
   struct stat known {};
-  const bool is_own = ::fstat(made, &known) == 0 && known.st_uid == ::geteuid();
+  const bool is_own = is_new || (::fstat(made, &known) == 0 && S_ISREG(known.st_mode) &&
+                                 known.st_uid == ::geteuid());
   ::close(made);
   return is_own;
 }
