@@ -79,7 +79,7 @@ inline constexpr double max_filled_gap_m = 6.0;
 /// get an `assumed` level. They are a `pit` if they and two cells beside them were measured below
 /// the ground at both ends of a line through them (at its one end, where the other has none), of
 /// the nearer one farther than a slope falls, and nothing of theirs at its level. Cells within
-/// `border` of the grid's edge are left unchanged.
+/// `border` of the grid's edge are not filled; those with voxels are `assumed`.
 /// @pre `seen` has no origin other than `none` and `seen`
 [[nodiscard]] GroundGrid fill_holes(const GroundGrid& seen, const ColumnGrid& columns,
                                     const GroundLevel& level, double cell_m, int border = 0);

@@ -435,8 +435,10 @@ GroundGrid fill_holes(const GroundGrid& seen, const ColumnGrid& columns, const G
   const Holes holes(seen, columns, cell_m);
   GroundGrid filled = seen;
   for_each_cell(seen, [&](int x, int y) {
-    if (seen(x, y).is_known() || !seen.contains(x - border, y - border) ||
-        !seen.contains(x + border, y + border)) {
+    if (seen(x, y).is_known()) return;
+    if (!seen.contains(x - border, y - border) || !seen.contains(x + border, y + border)) {
+      // No slope leads through what was measured there, either (shape_at).
+      if (!columns(x, y).empty()) filled(x, y) = assumed_at(columns(x, y).front().height_m);
       return;
     }
     if (const std::optional<GroundCell> ground = holes.inferred(x, y)) {

@@ -179,15 +179,22 @@ double rise_across(const GroundGrid& ground, int x, int y, std::pair<int, int> d
                    double cell_m) {
   const double length_m = cell_m * std::hypot(d.first, d.second);
   const int cells = static_cast<int>(max_filled_gap_m / length_m);
+  std::optional<double> near_m;
   for (int i = 1; i <= cells; ++i) {
     const int last_x = x + sign * i * d.first;
     const int last_y = y + sign * i * d.second;
     if (!ground.contains(last_x, last_y)) return 0.0;
     const GroundCell& last = ground(last_x, last_y);
     if (last.origin == GroundOrigin::assumed || last.origin == GroundOrigin::pit) return 0.0;
-    if (!last.is_known() || i < rise_cells) continue;
+    if (!last.is_known()) continue;
     const double away_m = last.height_m - ground(x, y).height_m;
     const double rise_m = sign * away_m / i;
+    if (i < rise_cells) {
+      near_m = rise_m;
+      continue;
+    }
+    // A platform of two or three cells is no slope.
+    if (near_m && *near_m * rise_m < 0.5 * rise_m * rise_m) return 0.0;
     return std::abs(rise_m) <= unseen_slope * length_m ? rise_m : 0.0;
   }
   return 0.0;

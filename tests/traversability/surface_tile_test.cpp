@@ -193,6 +193,20 @@ TEST(SurfaceShape, ASlopeOfSingleRowsIsNoHiddenDropAndATerraceOfThemIs) {
   }
 }
 
+TEST(SurfaceShape, AShallowPlatformBelowATerraceIsNoSlope) {
+  for (const int deep : {2, 3, 4}) {
+    GroundGrid ground = ground_of([](double x, double) {
+      return x < -1.5 ? 0.7 : x > 1.7 ? -1.1 : 0.0;
+    });
+    for_each_cell(ground, [&](int x, int y) {
+      const bool is_behind = x > middle - 8 && x <= middle - deep;
+      const bool is_ahead = x > middle && x < middle + 9;
+      if (is_behind || is_ahead) ground(x, y) = {};
+    });
+    EXPECT_NEAR(shape_in_the_middle(ground).hidden_drop_m, 1.1, 1e-5) << deep;
+  }
+}
+
 TEST(SurfaceShape, NoiseOnASlopeIsSeldomAStep) {
   std::mt19937 random(3);
   std::normal_distribution<double> noise_m(0.0, 0.012);
