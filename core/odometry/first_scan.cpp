@@ -122,10 +122,7 @@ void straighten_first_scan(const FirstScan& first, const FeatureSets& features, 
   if (!result) return;
   map = std::move(result->map);
   last.T_map_lidar = result->T_map_first;
-  // What else left the pose in doubt, a straight first scan does not settle.
-  const bool is_doubtful = second.health == OdometryHealth::degenerate;
   second = result->second;
-  if (is_doubtful) second.health = OdometryHealth::degenerate;
 }
 
 }  // namespace stillmap
