@@ -234,6 +234,9 @@ void Odometry::State::straighten(const FeatureSets& features, std::int64_t time_
     return;
   straighten_first_scan(first, features, interval_s, sweep, method(),
                         sensor.motion_limits.max_speed_m_s, map, last, second);
+  // A straight first scan settles doubts that a bent one raised, but not this one.
+  if (is_movable_denied && second.health == OdometryHealth::good)
+    second.health = OdometryHealth::degenerate;
 }
 
 void Odometry::State::confirm_place(const FeatureSets& features, const PosePrediction& prediction,
@@ -283,6 +286,9 @@ void Odometry::State::judge_what_could_move(ScanInParts& parts, const PosePredic
   }
   const std::optional<double> seen_before = share_seen_before(parts, history, result.T_map_lidar);
   if (seen_before && *seen_before < min_fixed_share) {
+    // Few of the surfaces are too few without the objects: find_pose put all of them aside.
+    if (parts.few_surfaces.size() > parts.features.surfaces.size())
+      std::swap(parts.features.surfaces, parts.few_surfaces);
     features = fixed_or_parked_features(parts, config);
     result = estimate_pose(features, prediction);
     is_movable_denied = true;
@@ -294,7 +300,8 @@ void Odometry::State::judge_what_could_move(ScanInParts& parts, const PosePredic
     is_movable_denied = false;
     return;
   }
-  if (is_movable_denied) return;
+  // A pose in doubt anyway does not tell: the denial would outlast it.
+  if (is_movable_denied || result.health != OdometryHealth::good) return;
   const OdometryResult by_fixed = register_features(
       fixed_features(parts, config), map, result.T_map_lidar, method(), result.sweep_correction);
   const PoseTangent off = boxminus(by_fixed.T_map_lidar, result.T_map_lidar);
@@ -380,7 +387,10 @@ void Odometry::State::go_on_by_surfaces(const ScanInParts& parts, const Step& st
                     .motion_classes = parts.motion_classes,
                     .sparse_rings = has_sparse_rings(sensor),
                     .movable = parts.movable};
-  FeatureSets registered = registered_features(again, config);
+  // As this scan was registered: what was found to move stays out.
+  FeatureSets registered = parts.movable == MovableUse::not_moving
+                               ? registered_features(again, config)
+                               : fixed_or_parked_features(again, config);
   FeatureSets latest = registered;
   ring_start.add(std::move(registered), map_features(again, step.motion, config),
                  step.T_map_lidar_middle);
