@@ -148,7 +148,8 @@ TEST(MovableWorld, WhatDrivesFasterThanTheLidarIsNotCalledGood) {
 TEST(MovableWorld, FewPolesHoldTheLidarWhereTheVehiclesBesideItSetOff) {
   const auto vehicles = [](double t) { return at_a_light(way_m(t - 2.0)); };
   const auto lidar_x = [](double t) { return way_m(t - 2.5); };
-  EXPECT_LT(wrong_poses(vehicles, lidar_x).worst_m, 3.5) << "along with those it would be 4.5 m off";
+  EXPECT_LT(wrong_poses(vehicles, lidar_x).worst_m, 3.5)
+      << "along with those it would be 4.5 m off";
 }
 
 /// A network that takes houses for lorries, and one that takes the road for one.
