@@ -45,7 +45,8 @@ struct LoopClosingConfig {
   std::size_t agreement_submaps = 3;
   /// A street that a bridge leads over, and the storeys of a car park, look alike: one that moves
   /// the later place up or down by more than this needs closures that agree on so much of the plan,
-  /// which neither has, from one of so many next submaps [m].
+  /// which neither has, from one of so many next submaps; not where both show that nothing leads
+  /// over the other's way [m].
   double max_height_jump_m = 1.0;
   double level_extent_m = 80.0;
   std::size_t level_agreement_submaps = 8;
@@ -198,6 +199,8 @@ class LoopCloser {
     std::size_t to = 0;
     LoopClosure closure;
     PoseEdge edge;
+    /// Both submaps show that nothing leads over the other's way: they are no two levels.
+    bool is_open_above = false;
   };
 
   void add_node(std::size_t scan, const Eigen::Isometry3d& T_odom_lidar);
@@ -214,6 +217,11 @@ class LoopCloser {
   /// How far the lidar went away from the one place before it came to the other [m].
   [[nodiscard]] double excursion_m(std::size_t from, std::size_t to) const;
   [[nodiscard]] std::optional<Candidate> verify(std::size_t from, std::size_t to, double way_m);
+  /// Places of the lidar along a submap, in its frame [m].
+  [[nodiscard]] std::vector<Eigen::Vector3d> way_along(const PlacedSubmap& placed) const;
+  /// Whether each of the two would show what leads over the way of the other, and shows nothing.
+  [[nodiscard]] bool are_open_above(const PlacedSubmap& a, const PlacedSubmap& b,
+                                    const Eigen::Isometry3d& T_a_b) const;
   [[nodiscard]] bool is_denied(std::size_t from, std::size_t to) const;
   /// Whether the scan of this number is of this submap or one of its neighbours.
   [[nodiscard]] bool is_about(std::size_t number, std::size_t submap) const;

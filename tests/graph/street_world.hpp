@@ -39,6 +39,15 @@ class StreetWorld {
         add_house(start + house.way, house.width, house.right, house.height, house.depth);
   }
 
+  /// Over the street and its pavements, all the way.
+  void add_roof(double height_m) {
+    for (double way = 0.0; way < length_m; way += 0.4)
+      for (double right = -4.0; right < 4.0; right += 0.4) add(way, right, height_m);
+  }
+
+  /// Of the lidar's beams.
+  double max_elevation_rad = 1.6;
+
   /// Pose of a lidar on the street, forwards or backwards in the other lane.
   [[nodiscard]] Eigen::Isometry3d T_map_lidar_at(double way_m, bool backwards) const {
     const double angle = way_m / radius_m;
@@ -59,6 +68,7 @@ class StreetWorld {
       if (random() % 3 != 0) continue;
       const Eigen::Vector3f p = T * p_map;
       if (p.squaredNorm() > 30.0F * 30.0F) continue;
+      if (std::atan2(p.z(), p.head<2>().norm()) > max_elevation_rad) continue;
       scan.scan.points_lidar.push_back(p * (1.0F + noise(random) / p.norm()));
     }
     scan.motion.assign(scan.scan.size(), Motion::stationary);
