@@ -166,6 +166,59 @@ bool holds_beside_lidar(const LevelPlane& plane, std::span<const Eigen::Vector3f
          std::ranges::count_if(nearest, is_seen);
 }
 
+/// Points of one metre along a strip of ground.
+struct StripMetre {
+  double points = 0.0, across_m = 0.0, height_m = 0.0, squares_m2 = 0.0, products_m2 = 0.0;
+
+  void add(double p_across_m, double p_height_m) {
+    points += 1.0;
+    across_m += p_across_m;
+    height_m += p_height_m;
+    squares_m2 += p_across_m * p_across_m;
+    products_m2 += p_across_m * p_height_m;
+  }
+};
+
+/// Whether a strip of ground, along the plane's level line and its middle `middle_m` up the slope
+/// from the lidar's foot, rises across that line by a third of what the plane does or less. Each
+/// metre of the strip has a height of its own: kerbs and platforms across it say nothing.
+bool is_strip_level(const LevelPlane& plane, std::span<const Eigen::Vector3f> lowest,
+                    double middle_m) {
+  constexpr double half_width_m = 1.3, near_m = 0.5, level_share = 0.65;
+  constexpr std::size_t min_metres = 6;
+  const double slope = plane.slope.norm();
+  const Eigen::Vector2d up_slope = plane.slope / slope, along(-up_slope.y(), up_slope.x());
+  std::array<StripMetre, across> metres{};
+  for (const Eigen::Vector3f& p : lowest) {
+    const Eigen::Vector2d at = p.head<2>().cast<double>();
+    const double across_m = up_slope.dot(at) - middle_m, height_m = above(plane, p);
+    if (std::abs(across_m) > half_width_m || std::abs(height_m) > near_m) continue;
+    const double along_m = std::clamp(along.dot(at) + reach_m, 0.0, across - 0.5);
+    metres[static_cast<std::size_t>(along_m)].add(across_m, height_m);
+  }
+  std::size_t seen = 0;
+  double squares_m2 = 0.0, products_m2 = 0.0;
+  for (const StripMetre& m : metres) {
+    if (m.points < 2.0) continue;
+    ++seen;
+    squares_m2 += m.squares_m2 - m.across_m * m.across_m / m.points;
+    products_m2 += m.products_m2 - m.across_m * m.height_m / m.points;
+  }
+  return seen >= min_metres && products_m2 < -level_share * slope * squares_m2;
+}
+
+/// Whether the lidar is on a level lane in a slope: however much of what is around lies on the
+/// plane of that, the lane, which goes along the slope's level line, does not rise across that
+/// line. The lidar may be nearer to one edge of it than to the other. Where no ground is seen there
+/// nothing speaks for a lane.
+bool is_on_lane_in_slope(const LevelPlane& plane, std::span<const Eigen::Vector3f> lowest) {
+  constexpr double least_slope = 1e-3;
+  if (plane.slope.norm() < least_slope) return false;
+  return std::ranges::any_of(std::array{-1.0, 0.0, 1.0}, [&](double middle_m) {
+    return is_strip_level(plane, lowest, middle_m);
+  });
+}
+
 /// Entropy of the elevations of points far enough away for them not to matter where exactly the
 /// beams start.
 double entropy_of_elevations(std::span<const Eigen::Vector3f> points) {
@@ -207,7 +260,8 @@ std::optional<LidarStance> stance_over_ground(std::span<const Eigen::Vector3f> p
   if (lowest.size() < min_cells) return std::nullopt;
   const auto plane = fit_level_plane(lowest, max_slope, min_share);
   if (!plane || !is_ground_of(*plane, lowest) || !is_plane_in_both_halves(*plane, lowest) ||
-      has_another_grade(*plane, lowest) || !holds_beside_lidar(*plane, points_lidar))
+      has_another_grade(*plane, lowest) || !holds_beside_lidar(*plane, points_lidar) ||
+      is_on_lane_in_slope(*plane, lowest))
     return std::nullopt;
   const Eigen::Vector3d normal = normal_of(*plane);
   const double height_m = -plane->height_m * normal.z();

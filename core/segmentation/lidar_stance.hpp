@@ -24,11 +24,12 @@ struct LidarStance {
 /// The stance that a scan shows where its ground is one clear plane: half of what is lowest within
 /// 20 m lies on it, hardly anything below it, and both halves of it, up and down its slope, are
 /// parts of the same plane, without another one on one side of the lidar, and the ground beside the
-/// lidar lies on it in two of three directions. So neither a change of grade ahead, as at the foot
-/// of a hill, nor a bank beside the road counts as a tilt, nor do fields below the road as its
-/// ground, and the tilt is that against the road, not against gravity; but a level lane of 4 to 6 m
-/// in a steep slope may be taken for a part of that. Nothing in other places, for a lidar that
-/// leans by more than 30 degrees, and for one on the ground, where the origin of a robot may be.
+/// lidar lies on it in two of three directions, and rises with it across its level line through the
+/// lidar's foot. So neither a change of grade ahead, as at the foot of a hill, nor a bank beside
+/// the road counts as a tilt, nor do fields below the road as its ground, nor the slope that a
+/// level lane is cut into, and the tilt is that against the road, not against gravity. Nothing in
+/// other places, for a lidar that leans by more than 30 degrees, and for one on the ground, where
+/// the origin of a robot may be.
 [[nodiscard]] std::optional<LidarStance> stance_over_ground(
     std::span<const Eigen::Vector3f> points_lidar);
 

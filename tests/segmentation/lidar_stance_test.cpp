@@ -86,14 +86,22 @@ TEST(LidarStance, IsNotThatAgainstARiseAhead) {
   }
 }
 
+/// Beams of a lidar, evenly spaced.
+struct Beams {
+  int count = 64;
+  double highest_deg = 2.0;
+  double step_deg = 0.425;
+};
+
 /// Of ground whose height at y is `height_at_m(y)`, for an upright lidar 1.73 m over that at 0, as
-/// 64 beams see it within 60 m.
+/// these beams see it within 60 m.
 template <typename HeightAt>
-std::vector<Eigen::Vector3f> scan_along_road(HeightAt height_at_m) {
-  constexpr double lidar_m = 1.73, reach_m = 60.0, step_m = 0.05;
+std::vector<Eigen::Vector3f> scan_along_road(HeightAt height_at_m, const Beams& beams = {}) {
+  constexpr double reach_m = 60.0, step_m = 0.05;
+  const double lidar_m = 1.73 + height_at_m(0.0);
   std::vector<Eigen::Vector3f> points;
-  for (int beam = 0; beam < 64; ++beam) {
-    const double slope = std::tan((2.0 - 0.425 * beam) * rad_per_deg);
+  for (int beam = 0; beam < beams.count; ++beam) {
+    const double slope = std::tan((beams.highest_deg - beams.step_deg * beam) * rad_per_deg);
     for (int column = 0; column < 360; ++column) {
       const double azimuth = (column + 0.3) * rad_per_deg;
       for (double r = 1.0; r < reach_m; r += step_m) {
@@ -119,14 +127,45 @@ TEST(LidarStance, IsNotThatAgainstTheFieldsBesideARoad) {
   }
 }
 
+/// A level lane along a slope, and an upright lidar on it.
+struct LaneInSlope {
+  double half_width_m = 2.0;
+  double slope_deg = 8.0;
+  /// Cut into the slope, with sides of 45 degrees; or else the slope begins at its edges.
+  bool is_cut = false;
+  /// From the middle of the lane to the lidar.
+  double off_m = 0.0;
+
+  [[nodiscard]] double found_tilt_deg(const Beams& beams) const {
+    const auto stance =
+        stance_over_ground(scan_along_road([&](double y) { return height_m(y + off_m); }, beams));
+    return stance ? stance->tilt_rad / rad_per_deg : 0.0;
+  }
+
+ private:
+  [[nodiscard]] double height_m(double y) const {
+    const double slope = std::tan(slope_deg * rad_per_deg);
+    const double beside_m = std::max(0.0, std::abs(y) - half_width_m);
+    return std::copysign(is_cut ? std::min(slope * std::abs(y), beside_m) : slope * beside_m, y);
+  }
+};
+
 TEST(LidarStance, IsNotThatAgainstTheSlopeThatALevelLaneIsIn) {
-  constexpr double half_width_m = 2.0;
-  for (const double slope_deg : {8.0, 10.0}) {
-    const auto stance = stance_over_ground(scan_along_road([&](double y) {
-      const double beside_m = std::max(0.0, std::abs(y) - half_width_m);
-      return std::copysign(std::tan(slope_deg * rad_per_deg) * beside_m, y);
-    }));
-    EXPECT_LT(stance ? stance->tilt_rad : 0.0, 3.0 * rad_per_deg) << slope_deg;
+  const Beams hdl_64e, vlp_16{.count = 16, .highest_deg = 15.0, .step_deg = 2.0};
+  std::vector<LaneInSlope> lanes;
+  for (const double half_width_m : {2.0, 3.0}) {
+    for (const double slope_deg : {8.0, 10.0}) {
+      for (const bool is_cut : {false, true}) {
+        lanes.push_back({half_width_m, slope_deg, is_cut, 0.0});
+        lanes.push_back({half_width_m, slope_deg, is_cut, 1.0});
+      }
+    }
+  }
+  for (const LaneInSlope& lane : lanes) {
+    EXPECT_LT(lane.found_tilt_deg(hdl_64e), 3.0)
+        << lane.half_width_m << ' ' << lane.slope_deg << ' ' << lane.is_cut << ' ' << lane.off_m;
+    EXPECT_LT(lane.found_tilt_deg(vlp_16), 3.0)
+        << lane.half_width_m << ' ' << lane.slope_deg << ' ' << lane.is_cut << ' ' << lane.off_m;
   }
 }
 
