@@ -43,6 +43,9 @@ struct LabelsConfig {
   /// Longest wait of a scan for the network's labels; then it is mapped with labels
   /// propagated from the map and earlier scans. 0: no limit, as with input delivery `every`.
   std::uint32_t budget_ms = 90;
+  /// Where the mount tells neither a lean nor a height, they are those that the ground shows, scan
+  /// by scan. False: as the mount says, whatever the ground shows.
+  bool finds_stance = true;
 };
 
 /// Names of the coordinate frames in everything that is published (REP 105).

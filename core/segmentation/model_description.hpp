@@ -85,6 +85,9 @@ struct ModelDescription {
   /// Trained for many sensors: the image takes its field of view from the sensor, and so many rows
   /// as suit it. See for_sensor().
   bool follow_sensor = false;
+  /// Where no mount tells how the lidar leans and how high it is, the ground that it sees does (see
+  /// stance_over_ground()). False: then it counts as upright, at `lidar_height_m`.
+  bool finds_stance = true;
   InputStatistics statistics;
 
   /// Entry n is the class of the network's output n.

@@ -262,7 +262,8 @@ NetworkSegmenter::View NetworkSegmenter::view_of(const Scan& scan, const Mount& 
     } else {
       view.moved_points = std::move(turned);
     }
-  } else if (model_.follow_sensor && model_.lidar_height_m && !mount.height_m) {
+  } else if (model_.finds_stance && model_.follow_sensor && model_.lidar_height_m &&
+             !mount.height_m) {
     look_for_mount(scan.points_lidar, view);
   }
   return view;

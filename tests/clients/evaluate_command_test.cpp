@@ -131,6 +131,22 @@ TEST_F(EvaluateCommandTest, RunsTheNetworkOnAnImageOfTheWidthAskedFor) {
   EXPECT_EQ(run(command + " --columns 9000").exit_code, 2);
 }
 
+TEST_F(EvaluateCommandTest, BelievesTheMountAloneWhereAskedTo) {
+  const std::string mount = " --mount 0,0,1.7,0,15,0";
+  ASSERT_EQ(run("simulate " + path("leaning") + " --sensor vlp_16 --scans 1" + mount).exit_code, 0);
+  const std::string command =
+      "evaluate segmentation --json --columns 512 --truth " + path("leaning");
+  const auto accuracy = [&](const std::string& more) {
+    const ProcessResult result = run(command + more);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(result.out).at("accuracy").get<double>();
+  };
+  const double untold = accuracy(" --stance mount");
+  EXPECT_GT(accuracy(""), untold + 0.1);
+  EXPECT_GT(accuracy(" --stance mount" + mount), untold + 0.1);
+  EXPECT_EQ(run(command + " --stance upright").exit_code, 2);
+}
+
 TEST_F(EvaluateCommandTest, TellsTheNetworkHowTheLidarLeans) {
   const std::string mount = " --mount 0,0,1.7,180,0,0";
   ASSERT_EQ(run("simulate " + path("hanging") + " --sensor vlp_16 --scans 1" + mount).exit_code, 0);

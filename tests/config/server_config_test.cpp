@@ -48,7 +48,8 @@ TEST(ServerConfig, ReportsWhatAFileChanges) {
 TEST(ServerConfig, ReadsFieldsOfEveryKind) {
   const ServerConfig config = load(R"(
 sensor: vlp_16
-labels: {source: none, engine: onednn, precision: int8, threads: 3, image_columns: 512}
+labels: {source: none, engine: onednn, precision: int8, threads: 3, image_columns: 512,
+         stance: mount}
 dds: {domain_id: 42, shared_memory: false, interfaces: [127.0.0.1],
       profile: wifi, peers: [a, "b:1"], discovery_server: c, socket_buffer_bytes: 99999}
 topics: {odometry_prior: ""}
@@ -63,6 +64,7 @@ static_map: {min_points: 5}
   EXPECT_EQ(config.labels.engine.precision, EngineOptions::PrecisionMode::int8);
   EXPECT_EQ(config.labels.engine.threads, 3);
   EXPECT_EQ(config.labels.image_columns, 512);
+  EXPECT_FALSE(config.labels.finds_stance);
   EXPECT_EQ(config.dds.domain_id, 42U);
   EXPECT_EQ(config.dds.network.shared_memory, std::optional<bool>(false));
   EXPECT_THAT(config.dds.network.interfaces, ::testing::ElementsAre("127.0.0.1"));
@@ -219,6 +221,7 @@ TEST(ServerConfig, SuggestsTheNameThatWasMeant) {
   EXPECT_THAT(refusal_of("sensor: hdl64e"), HasSubstr("did you mean 'hdl_64e'"));
   EXPECT_THAT(refusal_of("labels: {image_columns: 15}"), HasSubstr("image_columns"));
   EXPECT_THAT(refusal_of("labels: {image_columns: 8193}"), HasSubstr("image_columns"));
+  EXPECT_THAT(refusal_of("labels: {stance: upright}"), HasSubstr("known are: auto, mount"));
   EXPECT_THAT(refusal_of("input: {delivery: reliable}"), HasSubstr("known are: latest, every"));
 }
 

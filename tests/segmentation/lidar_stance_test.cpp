@@ -258,5 +258,28 @@ TEST(NetworkSegmenterOfAnUntoldMount, ShowsTheGroundLevelAndAsDeepAsUsual) {
   EXPECT_FALSE(shows_level_ground(scan)) << "what is told is believed";
 }
 
+TEST(NetworkSegmenterOfAnUntoldMount, IsUprightWhereNoStanceIsLookedFor) {
+  ModelDescription model = test::describe_family(64, 512, 20);
+  model.follow_sensor = true;
+  model.lidar_height_m = 1.7;
+  model.finds_stance = false;
+  std::vector<float> heights_m;
+  NetworkSegmenter labels(model, std::make_unique<KeepsHeights>(model.statistics, heights_m));
+  Scan scan;
+  scan.points_lidar = Court{.R_world_lidar = leaning(0.0, 12.0)}.scan();
+  const float lowest_m =
+      std::ranges::min(scan.points_lidar, {}, [](const Eigen::Vector3f& p) { return p.z(); }).z();
+  static_cast<void>(labels.segment(scan));
+  EXPECT_NEAR(heights_m.front(), lowest_m, 0.1F);
+  scan.points_lidar = Court{.height_m = 0.9}.scan();
+  static_cast<void>(labels.segment(scan));
+  EXPECT_NEAR(heights_m[heights_m.size() / 3], -0.9F, 0.1F);
+  // A lean that is told counts.
+  scan.points_lidar = Court{.R_world_lidar = leaning(0.0, 12.0)}.scan();
+  labels.set_mount(Eigen::Isometry3d(leaning(0.0, 12.0)));
+  static_cast<void>(labels.segment(scan));
+  EXPECT_NEAR(heights_m[heights_m.size() / 3], -1.7F, 0.1F);
+}
+
 }  // namespace
 }  // namespace stillmap

@@ -47,6 +47,12 @@ void add_segmentation_options(CommandHandle command, MapperArguments& arguments)
           "model says")
       .between(min_image_columns, max_image_columns);
   add_engine_options(command, arguments.engine);
+  command
+      .option("--stance", arguments.stance,
+              "How the lidar leans, and its height, for a model that runs: auto (as the mount "
+              "says; where that tells neither, as the ground shows), mount (as the mount says, "
+              "else upright); default: as configured, else auto")
+      .one_of({"auto", "mount"});
 }
 
 void add_mapper_options(CommandHandle command, MapperArguments& arguments) {
@@ -151,6 +157,7 @@ LabelsConfig labels_config(const MapperArguments& arguments, const ScanDataset& 
     require_semantic_kitti_labels(dataset);
   if (arguments.columns > 0) labels.image_columns = static_cast<int>(arguments.columns);
   set_engine(arguments.engine, labels.engine);
+  if (!arguments.stance.empty()) labels.finds_stance = arguments.stance == "auto";
   return labels;
 }
 

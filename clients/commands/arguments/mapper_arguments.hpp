@@ -39,12 +39,14 @@ struct MapperArguments {
   /// Of the network's range image; 0: as configured.
   std::uint32_t columns = 0;
   EngineArguments engine;
+  /// "auto" or "mount"; empty: as configured.
+  std::string stance;
 
   /// Whether `sensor` is one, and not left to the dataset.
   [[nodiscard]] bool names_sensor() const;
 };
 
-/// Adds --columns, --engine, --precision and --threads.
+/// Adds --columns, --engine, --precision, --threads and --stance.
 void add_segmentation_options(CommandHandle command, MapperArguments& arguments);
 /// Adds these and --config, --sensor, --labels, --weighting.
 void add_mapper_options(CommandHandle command, MapperArguments& arguments);
