@@ -212,7 +212,8 @@ bool is_strip_level(const LevelPlane& plane, std::span<const Eigen::Vector3f> lo
 /// line. The lidar may be nearer to one edge of it than to the other. Where no ground is seen there
 /// nothing speaks for a lane.
 bool is_on_lane_in_slope(const LevelPlane& plane, std::span<const Eigen::Vector3f> lowest) {
-  constexpr double least_slope = 1e-3;
+  // Less hardly counts as a lean (3 degrees), and strips of roads differ by as much.
+  constexpr double least_slope = 0.05;
   if (plane.slope.norm() < least_slope) return false;
   return std::ranges::any_of(std::array{-1.0, 0.0, 1.0}, [&](double middle_m) {
     return is_strip_level(plane, lowest, middle_m);
