@@ -133,9 +133,17 @@ std::optional<TrainedSensors> read_trained_for(YamlSection section) {
   return seen;
 }
 
+/// It stands in lines of logs, of the status and of terminals.
+void read_name(YamlSection& file, std::string& name) {
+  file.text("name", name);
+  const auto is_shown = [](unsigned char c) { return c >= 0x20 && c != 0x7F; };
+  if (file.has("name") && (name.empty() || !std::ranges::all_of(name, is_shown)))
+    file.fault("name", "must be one line of characters that can be shown");
+}
+
 void read_model(YamlSection file, ModelDescription& model) {
   file.require({"name", "licence", "image", "statistics", "classes"});
-  file.text("name", model.name);
+  read_name(file, model.name);
   file.text("licence", model.licence);
   file.text("sensor", model.sensor);
   file.text("training", model.training);

@@ -203,6 +203,10 @@ TEST(ModelFile, NamesWhatIsMissingOrWrong) {
   EXPECT_THAT(refusal_of(sound, "rows: 64", "rows: -64"), HasSubstr("image.rows: '-64'"));
   EXPECT_THAT(refusal_of(sound, "fov_up_deg: 3", "fov_up_deg: -30"), HasSubstr("below"));
   EXPECT_THAT(refusal_of(sound, "neighbours: 7", "window: 4"), HasSubstr("odd"));
+  for (const char* const name : {R"("")", R"("tiny\n2026 all is well")", R"("\e[31mred")"})
+    EXPECT_THAT(refusal_of(sound, "name: tiny", std::string("name: ") + name),
+                HasSubstr("one line"))
+        << name;
 }
 
 TEST(ModelFile, RefusesAFolderThatIsNotThere) {
