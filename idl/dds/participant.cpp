@@ -20,6 +20,7 @@
 #include "idl/dds/qos.hpp"
 #include "idl/dds/ros_graph.hpp"
 #include "idl/dds/ros_nodes.hpp"
+#include "idl/dds/secured_participant.hpp"
 #include "idl/dds/security/identity.hpp"
 #include "idl/dds/transports.hpp"
 #include "idl/dds/type_hash.hpp"
@@ -75,29 +76,6 @@ void check_type_support(const DomainParticipant& participant, const TypeSupport&
     throw DdsError("type " + type.get_type_name() +
                    " is used in one process both as messages and as serialized bytes");
   }
-}
-
-/// Adds what switches DDS Security on with the identity in this folder.
-void add_security(const std::filesystem::path& identity_folder,
-                  eprosima::fastrtps::rtps::PropertyPolicy& properties) {
-  const IdentityFiles files(std::filesystem::absolute(identity_folder));
-  const auto add = [&](const std::string& name, const std::string& value) {
-    properties.properties().emplace_back(name, value);
-  };
-  const auto add_file = [&](const std::string& name, const std::filesystem::path& file) {
-    add(name, "file://" + file.string());
-  };
-  const std::string authentication = "dds.sec.auth.builtin.PKI-DH.";
-  const std::string access = "dds.sec.access.builtin.Access-Permissions.";
-  add("dds.sec.auth.plugin", "builtin.PKI-DH");
-  add_file(authentication + "identity_ca", files.identity_authority);
-  add_file(authentication + "identity_certificate", files.certificate);
-  add_file(authentication + "private_key", files.key);
-  add("dds.sec.access.plugin", "builtin.Access-Permissions");
-  add_file(access + "permissions_ca", files.permissions_authority);
-  add_file(access + "governance", files.governance);
-  add_file(access + "permissions", files.permissions);
-  add("dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC");
 }
 
 std::unique_ptr<const Identity> identity_of(const DdsOptions& options) {

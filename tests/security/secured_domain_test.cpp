@@ -1,13 +1,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <fstream>
+#include <memory>
 #include <thread>
+#include <vector>
 
 #include "idl/dds/dds_error.hpp"
 #include "idl/dds/reader.hpp"
 #include "idl/dds/security/authority.hpp"
+#include "idl/dds/writer.hpp"
 #include "idl/interface/roles.hpp"
 #include "idl/interface/topics.hpp"
 #include "sensor_msgs.h"
@@ -100,6 +104,36 @@ class Listener {
   dds::Reader<sensor_msgs::msg::PointCloud2> reader_;
   int samples_ = 0;
 };
+
+/// One of many in a domain, with a writer that the others see once they have authenticated it.
+class Member {
+ public:
+  explicit Member(const dds::DdsOptions& dds)
+      : participant_(dds), writer_(participant_, "rt/points", {}) {}
+
+  [[nodiscard]] std::ptrdiff_t others_authenticated() const {
+    return std::ranges::count_if(
+        participant_.remote_participants(),
+        [](const dds::RemoteParticipant& other) { return !other.endpoints.empty(); });
+  }
+
+ private:
+  dds::Participant participant_;
+  dds::Writer<sensor_msgs::msg::PointCloud2> writer_;
+};
+
+// In each of them, several threads discover others at the same time.
+TEST_F(SecuredDomain, AuthenticatesEachOfManyWhoComeAtOnce) {
+  constexpr int members = 16;
+  dds::DdsOptions options = dds(identity("sensor"));
+  options.shared_memory_mib = 4;
+  std::vector<std::unique_ptr<Member>> all;
+  for (int i = 0; i < members; ++i) all.push_back(std::make_unique<Member>(options));
+  EXPECT_TRUE(eventually([&] {
+    return std::ranges::all_of(
+        all, [](const auto& one) { return one->others_authenticated() == members - 1; });
+  }));
+}
 
 TEST_F(SecuredDomain, IsDeafAndMuteToAnOutsider) {
   ASSERT_EQ(made_.exit_code, 0) << made_.err;
