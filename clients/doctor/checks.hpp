@@ -22,7 +22,7 @@ inline constexpr const char* cloud_type = "sensor_msgs::msg::dds_::PointCloud2_"
 [[nodiscard]] Diagnostics check_multicast(const SystemSnapshot& snapshot);
 /// An empty domain, and who is in others.
 [[nodiscard]] Diagnostics check_domain(const SystemSnapshot& snapshot);
-/// Secured on one side only, or refused.
+/// Secured on one side only, refused, or not authenticated.
 [[nodiscard]] Diagnostics check_security(const SystemSnapshot& snapshot);
 /// Participants that are discovered, but none of their endpoints.
 [[nodiscard]] Diagnostics check_silent_participants(const SystemSnapshot& snapshot);

@@ -18,7 +18,7 @@ namespace {
 using namespace eprosima::fastrtps::rtps;
 using eprosima::fastdds::dds::DomainParticipant;
 
-// A handshake takes a fraction of a second.
+// A handshake takes a fraction of a second, and one more for each of its messages that gets lost.
 constexpr std::chrono::seconds time_to_authenticate{2};
 
 template <typename T>
@@ -169,7 +169,7 @@ std::vector<RemoteParticipant> DiscoveryMonitor::remote_participants() const {
   const auto now = Clock::now();
   for (const auto& [prefix, known] : participants_) {
     RemoteParticipant peer = known.peer;
-    peer.refused = is_refused(known, now);
+    peer.unauthenticated = is_unauthenticated(known, now);
     for (const auto& [guid, endpoint] : remote_endpoints_) {
       if (guid.guidPrefix == prefix) peer.endpoints.push_back(endpoint);
     }
@@ -203,10 +203,10 @@ void DiscoveryMonitor::on_participant_discovery(DomainParticipant* participant,
   known->second.peer.refused = refused;
 }
 
-bool DiscoveryMonitor::is_refused(const Known& known, Clock::time_point now) const {
-  if (known.peer.refused) return true;
-  const bool must_authenticate = secured_ && known.peer.is_secured && !known.authenticated;
-  return must_authenticate && now - known.since > time_to_authenticate;
+bool DiscoveryMonitor::is_unauthenticated(const Known& known, Clock::time_point now) const {
+  if (!secured_ || !known.peer.is_secured || known.authenticated || known.peer.refused)
+    return false;
+  return now - known.since > time_to_authenticate;
 }
 
 void DiscoveryMonitor::onParticipantAuthentication(DomainParticipant*,

@@ -17,8 +17,8 @@
 
 namespace stillmap::dds {
 
-/// What discovery knows of the domain: participants, their endpoints, and which were refused by
-/// security; and our own endpoints. Thread-safe.
+/// What discovery knows of the domain: participants, their endpoints, and which security keeps from
+/// us; and our own endpoints. Thread-safe.
 class DiscoveryMonitor : public eprosima::fastdds::dds::DomainParticipantListener {
  public:
   using Guid = eprosima::fastrtps::rtps::GUID_t;
@@ -30,8 +30,7 @@ class DiscoveryMonitor : public eprosima::fastdds::dds::DomainParticipantListene
                           bool is_keyed, bool is_writer, const TopicQos& qos);
   void remove_local_endpoint(const Guid& guid);
 
-  /// The others, in the order of their guids. A participant that has not authenticated itself in
-  /// time counts as refused, too: often only one side learns of a refusal.
+  /// The others, in the order of their guids.
   [[nodiscard]] std::vector<RemoteParticipant> remote_participants() const;
   [[nodiscard]] std::vector<Endpoint> local_endpoints() const;
 
@@ -59,7 +58,7 @@ class DiscoveryMonitor : public eprosima::fastdds::dds::DomainParticipantListene
     Clock::time_point since;
     bool authenticated = false;
   };
-  [[nodiscard]] bool is_refused(const Known& known, Clock::time_point now) const;
+  [[nodiscard]] bool is_unauthenticated(const Known& known, Clock::time_point now) const;
   void add_remote_endpoint(const Guid& guid, Endpoint endpoint);
   void remove_remote_endpoint(const Guid& guid);
 

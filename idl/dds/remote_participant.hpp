@@ -63,8 +63,11 @@ struct RemoteParticipant {
   bool is_on_this_host = false;
   /// It announces an identity of DDS Security.
   bool is_secured = false;
-  /// Its identity or ours was refused.
+  /// Its identity or ours was refused, as far as this side was told.
   bool refused = false;
+  /// Secured as we are, and neither authenticated nor refused a while after it was discovered: it
+  /// refuses us, of which it alone is told, or the handshake stands still.
+  bool unauthenticated = false;
   std::vector<Endpoint> endpoints;
 };
 

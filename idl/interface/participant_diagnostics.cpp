@@ -172,6 +172,18 @@ std::vector<Diagnostic> security_diagnostics(const RemoteParticipant& self,
                        "wrong on one side",
            .hint = "run 'stillmap security check FOLDER' on both machines, and compare who "
                    "issued the two certificates and both clocks"});
+    } else if (peer.unauthenticated) {
+      diagnostics.push_back(
+          {.severity = Severity::problem,
+           .what = display_name(peer) + " and " + display_name(self) +
+                   " have not authenticated each other",
+           .evidence = "the handshake with " + describe(peer) +
+                       " does not end, and this side is told no reason: the other one refuses our "
+                       "identity (another authority, one that expired, a clock that is wrong), or "
+                       "its messages get lost",
+           .hint = "see what the other one says of it, and run 'stillmap security check FOLDER' on "
+                   "both machines; where nothing is wrong, restart one of the two (Fast DDS before "
+                   "2.6.5, 2.8.2 and 2.9.2 can leave a handshake in the middle)"});
     }
   }
   return diagnostics;
@@ -181,7 +193,8 @@ std::vector<Diagnostic> silent_participant_diagnostics(
     const RemoteParticipant& self, const std::vector<RemoteParticipant>& peers) {
   std::vector<Diagnostic> diagnostics;
   for (const RemoteParticipant& peer : peers) {
-    const bool is_explained = peer.refused || peer.is_secured != self.is_secured;
+    const bool is_explained =
+        peer.refused || peer.unauthenticated || peer.is_secured != self.is_secured;
     const bool has_none = peer.name == survey_participant || is_discovery_server(peer);
     if (!peer.endpoints.empty() || is_explained || has_none) continue;
     if (is_on_loopback_only(peer) && !is_on_loopback_only(self)) {

@@ -18,7 +18,8 @@ inline constexpr const char* survey_participant = "stillmap_survey";
 /// Of each that was found, those once that say the same; and how many more there are.
 [[nodiscard]] std::vector<Diagnostic> mismatch_diagnostics(const Mismatches& mismatches);
 
-/// Of participants that DDS Security keeps from `self`: secured on one side only, or refused.
+/// Of participants that DDS Security keeps from `self`: secured on one side only, refused, or not
+/// authenticated for no reason that this side knows.
 [[nodiscard]] std::vector<Diagnostic> security_diagnostics(
     const RemoteParticipant& self, const std::vector<RemoteParticipant>& peers);
 

@@ -43,6 +43,11 @@ TEST(ParticipantDiagnosticsTest, TellWhichSideLacksSecurity) {
   refused.refused = true;
   EXPECT_THAT(dds::security_diagnostics(secured, {refused}),
               ElementsAre(tells("refuse each other")));
+  dds::RemoteParticipant unauthenticated = secured;
+  unauthenticated.unauthenticated = true;
+  EXPECT_THAT(dds::security_diagnostics(secured, {unauthenticated}),
+              ElementsAre(AllOf(tells("have not authenticated each other"),
+                                Field(&dds::Diagnostic::hint, HasSubstr("restart one")))));
   EXPECT_THAT(dds::security_diagnostics(secured, {secured}), IsEmpty());
 }
 
@@ -84,6 +89,9 @@ TEST(ParticipantDiagnosticsTest, BlameSharedMemoryForASilentPeerOnThisHost) {
               ElementsAre(Field(&dds::Diagnostic::hint, HasSubstr("firewalls"))));
   silent.is_secured = true;
   EXPECT_THAT(dds::silent_participant_diagnostics(participant("self"), {silent}), IsEmpty());
+  dds::RemoteParticipant secured = participant("self");
+  secured.is_secured = silent.unauthenticated = true;
+  EXPECT_THAT(dds::silent_participant_diagnostics(secured, {silent}), IsEmpty());
 }
 
 TEST(ParticipantDiagnosticsTest, NameOtherServersOfAName) {

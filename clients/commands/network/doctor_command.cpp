@@ -27,6 +27,12 @@ std::size_t count(const Diagnostics& diagnostics, dds::Severity severity) {
       std::ranges::count(diagnostics, severity, &dds::Diagnostic::severity));
 }
 
+const char* security_of(const dds::RemoteParticipant& participant) {
+  if (participant.refused) return "refused";
+  if (participant.unauthenticated) return "not authenticated";
+  return participant.is_secured ? "yes" : "no";
+}
+
 std::string participant_table(const SystemSnapshot& snapshot) {
   if (snapshot.participants.empty()) return {};
   Table table({"participant", "vendor", "where", "writers", "readers", "security"});
@@ -34,8 +40,7 @@ std::string participant_table(const SystemSnapshot& snapshot) {
     const auto writers = std::ranges::count(participant.endpoints, true, &dds::Endpoint::is_writer);
     const auto all = static_cast<std::ptrdiff_t>(participant.endpoints.size());
     table.add({display_name(participant), participant.vendor, dds::describe_location(participant),
-               std::to_string(writers), std::to_string(all - writers),
-               participant.refused ? "refused" : (participant.is_secured ? "yes" : "no")});
+               std::to_string(writers), std::to_string(all - writers), security_of(participant)});
   }
   return table.text() + "\n";
 }
@@ -88,6 +93,7 @@ Json json_of(const dds::RemoteParticipant& participant) {
           {"this_host", participant.is_on_this_host},
           {"secured", participant.is_secured},
           {"refused", participant.refused},
+          {"unauthenticated", participant.unauthenticated},
           {"endpoints", endpoints}};
 }
 
