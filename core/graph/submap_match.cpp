@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/frames/rigid_motion.hpp"
+#include "core/graph/ceiling.hpp"
 #include "core/graph/submap_registration.hpp"
 #include "core/odometry/se3.hpp"
 
@@ -12,6 +13,8 @@ namespace {
 
 /// Poses that are no farther apart are one [m].
 constexpr double same_pose_m = 0.3;
+/// No storey is lower than this [m].
+constexpr double min_storey_m = 1.0;
 
 Eigen::Isometry2d in_plan(const Eigen::Isometry3d& T) {
   const Eigen::Vector3d ahead = T.linear().col(0);
@@ -36,6 +39,18 @@ std::string fault_of(const OdometryResult& found, const SubmapMatchConfig& confi
   if (found.fit < config.min_fit || found.upright_fit < config.min_upright_fit)
     return "the submaps do not fit";
   return "";
+}
+
+/// Whether the place, which is higher by this than where b was expected in a, is as likely the
+/// storey beside that: there is a ceiling over the lower one of both, and half of its height is
+/// nearer to the floor above.
+bool may_be_other_storey(const PlacedSubmap& a, const PlacedSubmap& b,
+                         const Eigen::Isometry3d& T_a_b, double height_m) {
+  const Eigen::Isometry2d plan = in_plan(T_a_b);
+  // Expected above a, or below it.
+  const auto ceiling_m =
+      height_m < 0.0 ? ceiling_height_m(a, b, plan.inverse()) : ceiling_height_m(b, a, plan);
+  return ceiling_m && std::abs(height_m) > 0.5 * *ceiling_m;
 }
 
 }  // namespace
@@ -79,6 +94,10 @@ std::optional<SubmapMatch> match_submaps(const PlacedSubmap& a, const PlacedSubm
   const double height_m = found.T_map_lidar.translation().z() - expected_z_m;
   if (std::abs(height_m) > window.reach_height_m) {
     match.refusal = "it is higher or lower than odometry can have drifted: another storey";
+    return match;
+  }
+  if (std::abs(height_m) > min_storey_m && may_be_other_storey(a, b, found.T_map_lidar, height_m)) {
+    match.refusal = "it is nearer to the storey above or below: there is a ceiling between";
     return match;
   }
   const Eigen::Isometry3d refinement = T_a_b_guess.inverse() * found.T_map_lidar;

@@ -16,16 +16,17 @@ using levels::drive;
 using levels::drive_away;
 using levels::drive_round;
 
-/// Closures of a drive by odometry without drift, and how far off the worst of them is.
+/// Closures of a drive, and how far off the worst of them is.
 struct Closures {
   std::size_t count = 0;
   double worst_m = 0.0;
 };
 
-Closures closures_of(const BoxWorld& world, const std::vector<Eigen::Isometry3d>& poses) {
+Closures closures_of(const BoxWorld& world, const std::vector<Eigen::Isometry3d>& poses,
+                     const std::vector<Eigen::Isometry3d>& T_odom_lidar) {
   LoopCloser closer{LoopClosingConfig{}};
   for (std::size_t k = 0; k < poses.size(); ++k)
-    closer.add(world.scan_at(poses[k], k + 1), poses[k], true);
+    closer.add(world.scan_at(poses[k], k + 1), T_odom_lidar[k], true);
   closer.finish();
   Closures found;
   for (const LoopClosure& closure : closer.closures()) {
@@ -35,6 +36,11 @@ Closures closures_of(const BoxWorld& world, const std::vector<Eigen::Isometry3d>
         std::max(found.worst_m, (truth.inverse() * closure.T_from_to).translation().norm());
   }
   return found;
+}
+
+/// By odometry without drift.
+Closures closures_of(const BoxWorld& world, const std::vector<Eigen::Isometry3d>& poses) {
+  return closures_of(world, poses, poses);
 }
 
 TEST(LoopsOnLevels, ABridgeIsNotTheStreetThatLeadsUnderIt) {
@@ -68,6 +74,37 @@ TEST(LoopsOnLevels, StoreysThatAreKnownAreFoundAgain) {
   const Closures found = closures_of(world, poses);
   EXPECT_LT(found.worst_m, 0.3);
   EXPECT_GE(found.count, 2U);
+}
+
+/// So long that closures agree on all the plan that another level asks for.
+constexpr double long_m = 120.0;
+
+TEST(LoopsOnLevels, StoreysOfALongCarParkAreNotOneAnother) {
+  const BoxWorld world = car_park(4, 2, long_m);
+  for (const bool is_first_below : {true, false}) {
+    std::vector<Eigen::Isometry3d> poses;
+    const double first_m = is_first_below ? 0.0 : 3.0;
+    drive(poses, {6, 7, first_m}, {long_m - 6.0, 7, first_m});
+    drive_away(poses, 500);
+    drive(poses, {6, 7, 3.0 - first_m}, {long_m - 6.0, 7, 3.0 - first_m});
+    EXPECT_LT(closures_of(world, poses).worst_m, 0.3) << is_first_below;
+  }
+}
+
+TEST(LoopsOnLevels, DriftUnderACeilingIsTakenOutUpToHalfAStorey) {
+  const BoxWorld world = car_park(4, 2, long_m);
+  std::vector<Eigen::Isometry3d> poses;
+  drive(poses, {6, 7, 0}, {long_m - 6.0, 7, 0});
+  const std::size_t back = poses.size();
+  drive_away(poses, 500);
+  drive(poses, {6, 7, 0}, {long_m - 6.0, 7, 0});
+  for (const double off_m : {-1.2, 1.2}) {
+    std::vector<Eigen::Isometry3d> T_odom_lidar = poses;
+    for (std::size_t k = back; k < poses.size(); ++k) T_odom_lidar[k].translation().z() += off_m;
+    const Closures found = closures_of(world, poses, T_odom_lidar);
+    EXPECT_GE(found.count, 2U) << off_m;
+    EXPECT_LT(found.worst_m, 0.3) << off_m;
+  }
 }
 
 }  // namespace

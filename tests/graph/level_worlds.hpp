@@ -101,10 +101,10 @@ inline void drive_away(std::vector<Eigen::Isometry3d>& poses, double there_m) {
 }
 
 /// Storeys of the same walls, pillars and stairs, with other cars on each; houses round them.
-inline BoxWorld car_park(std::uint64_t seed, int storeys) {
+inline BoxWorld car_park(std::uint64_t seed, int storeys, double length_m = 60.0) {
   BoxWorld world;
-  const double length_m = 60.0, width_m = 34.0, storey_m = 3.0;
-  world.add({-60, -60, -1}, {120, 90, -0.3});
+  const double width_m = 34.0, storey_m = 3.0;
+  world.add({-60, -60, -1}, {length_m + 60.0, 90, -0.3});
   for (int s = 0; s <= storeys; ++s) {
     const double z = s * storey_m;
     world.add({0, 0, z - 0.3}, {length_m, width_m, z});
@@ -131,7 +131,7 @@ inline BoxWorld car_park(std::uint64_t seed, int storeys) {
   world.add({-25, -12, 0}, {-14, 9, 12});
   world.add({8, -26, 0}, {20, -14, 14});
   world.add({29, -23, 0}, {44, -15, 16});
-  world.add({74, 2, 0}, {82, 21, 15});
+  world.add({length_m + 14.0, 2, 0}, {length_m + 22.0, 21, 15});
   world.add({3, 47, 0}, {16, 58, 13});
   world.add({26, 44, 0}, {41, 50, 16});
   return world;

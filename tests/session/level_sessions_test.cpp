@@ -80,5 +80,20 @@ TEST(SessionsOnLevels, OfAMapOfSeveralStoreysEachIsFound) {
   }
 }
 
+/// On so much of the plan that closures may lead to another level.
+TEST(SessionsOnLevels, NorIsTheOneAboveALongOne) {
+  constexpr double long_m = 120.0;
+  const levels::BoxWorld world = levels::car_park(4, 2, long_m);
+  Poses first, second;
+  for (Poses* const poses : {&first, &second})
+    levels::drive(*poses, {6, 7, 0}, {long_m - 6.0, 7, 0});
+  levels::drive_away(second, 500);
+  levels::drive(second, {6, 7, 3}, {long_m - 6.0, 7, 3});
+  const MapAlignment alignment = alignment_of(world, second, map_of(world, first));
+  ASSERT_TRUE(alignment.is_recognized()) << alignment.in_words();
+  EXPECT_GE(alignment.closures.size(), 3U);
+  EXPECT_LT(worst_m(alignment, second), 0.5);
+}
+
 }  // namespace
 }  // namespace stillmap

@@ -1,0 +1,70 @@
+#include "core/graph/ceiling.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <random>
+#include <utility>
+
+namespace stillmap {
+namespace {
+
+/// Heights of what is above the ground at a place [m].
+using Above = std::function<std::vector<float>(float x_m, float y_m)>;
+
+/// Ground of 20 m by 20 m, at this height, and what is above it.
+PlacedSubmap submap_of(float ground_m, const Above& above) {
+  Submap submap;
+  for (float x = -9.875F; x < 10.0F; x += 0.25F) {
+    for (float y = -9.875F; y < 10.0F; y += 0.25F) {
+      submap.points_submap.emplace_back(x, y, ground_m);
+      for (const float above_m : above(x, y))
+        submap.points_submap.emplace_back(x, y, ground_m + above_m);
+    }
+  }
+  submap.classes.assign(submap.points_submap.size(), SemanticClass::unlabeled);
+  return PlacedSubmap(std::move(submap));
+}
+
+std::optional<double> ceiling_of(const PlacedSubmap& lower) {
+  const PlacedSubmap upper = submap_of(2.6F, [](float, float) { return std::vector<float>{}; });
+  return ceiling_height_m(lower, upper, Eigen::Isometry2d::Identity());
+}
+
+TEST(Ceiling, IsWhatCoversTheGround) {
+  const auto over = [](float x_m, float) { return std::vector<float>{x_m < 0.0F ? 2.3F : 2.35F}; };
+  const auto height_m = ceiling_of(submap_of(-1.8F, over));
+  ASSERT_TRUE(height_m);
+  EXPECT_NEAR(*height_m, 2.33, 0.05);
+}
+
+TEST(Ceiling, IsKnownByTheFewStripesThatALidarSeesThatHardlyLooksUp) {
+  const auto over = [](float x_m, float) {
+    return x_m > 8.5F && x_m < 9.5F ? std::vector<float>{2.35F} : std::vector<float>{};
+  };
+  const auto height_m = ceiling_of(submap_of(-1.8F, over));
+  ASSERT_TRUE(height_m);
+  EXPECT_NEAR(*height_m, 2.35, 0.01);
+}
+
+TEST(Ceiling, IsNoSkyNorWallsCarsAndBranches) {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<float> height_m(2.0F, 8.0F);
+  const auto sky = [](float, float) { return std::vector<float>{}; };
+  const auto walls = [](float, float) { return std::vector<float>{0.7F, 1.2F, 1.7F, 2.2F}; };
+  const auto cars = [](float, float) { return std::vector<float>{1.4F}; };
+  const auto branches = [&](float, float) { return std::vector<float>{height_m(random)}; };
+  for (const Above& above : {Above(sky), Above(walls), Above(cars), Above(branches)})
+    EXPECT_FALSE(ceiling_of(submap_of(0.0F, above)));
+}
+
+TEST(Ceiling, SaysNothingWhereTheOtherSawNothing) {
+  const PlacedSubmap lower =
+      submap_of(0.0F, [](float, float) { return std::vector<float>{2.35F}; });
+  Eigen::Isometry2d T_upper_lower = Eigen::Isometry2d::Identity();
+  T_upper_lower.translation().x() = 30.0;
+  EXPECT_FALSE(ceiling_height_m(lower, lower, T_upper_lower));
+}
+
+}  // namespace
+}  // namespace stillmap
