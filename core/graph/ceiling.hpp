@@ -14,4 +14,10 @@ namespace stillmap {
                                                      const PlacedSubmap& upper,
                                                      const Eigen::Isometry2d& T_upper_lower);
 
+/// Whether a ceiling of `other` is over the way of `driver`, put there like this, which does not
+/// show it, though it shows higher things not far away: it was driven on another level, on top of
+/// it maybe. Both as they were seen, whatever their height.
+[[nodiscard]] bool lacks_ceiling(const Submap& driver, const Submap& other,
+                                 const Eigen::Isometry3d& T_other_driver);
+
 }  // namespace stillmap

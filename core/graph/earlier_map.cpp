@@ -6,6 +6,8 @@
 #include <span>
 #include <utility>
 
+#include "core/graph/ceiling.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -101,11 +103,14 @@ std::optional<EarlierMap::Match> EarlierMap::match(const Submap& submap,
   // Both frames are that of the expected pose, upright.
   AlignmentWindow window = window_after(config_.drift, way_m);
   window.has_levels = true;
+  const Submap all_levels = round;
   keep_level(round, mine.submap, window);
   if (round.points_submap.empty()) return std::nullopt;
   const PlacedSubmap piece(std::move(round));
   auto found = match_submaps(piece, mine, Eigen::Isometry3d::Identity(), window, config_.match);
   if (!found) return std::nullopt;
+  if (found->refusal.empty() && lacks_ceiling(mine.submap, all_levels, found->T_a_b))
+    found->refusal = "it does not show what the map has overhead: another level";
   const Eigen::Isometry3d T_map_piece = T_map_key_expected * piece.submap.T_submap_key.inverse();
   return Match{T_map_piece * found->T_a_b * mine.submap.T_submap_key, *std::move(found)};
 }

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <random>
 #include <utility>
+#include <vector>
 
 namespace stillmap {
 namespace {
@@ -64,6 +66,28 @@ TEST(Ceiling, SaysNothingWhereTheOtherSawNothing) {
   Eigen::Isometry2d T_upper_lower = Eigen::Isometry2d::Identity();
   T_upper_lower.translation().x() = 30.0;
   EXPECT_FALSE(ceiling_height_m(lower, lower, T_upper_lower));
+}
+
+/// Under it, on a street between houses of 8 m.
+TEST(Ceiling, IsMissedByWhoDroveOnAnotherLevel) {
+  const auto street = [](std::vector<float> over) {
+    return submap_of(
+               -1.8F,
+               [over](float, float y_m) {
+                 return std::abs(y_m) > 9.0F ? std::vector<float>{2.0F, 4.0F, 6.0F, 8.0F} : over;
+               })
+        .submap;
+  };
+  const auto no_houses = submap_of(-1.8F, [](float, float) { return std::vector<float>{}; }).submap;
+  const Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  const Submap roofed = street({4.7F});
+  EXPECT_TRUE(lacks_ceiling(street({}), roofed, T));
+  EXPECT_FALSE(lacks_ceiling(roofed, roofed, T));
+  EXPECT_FALSE(lacks_ceiling(roofed, street({}), T));
+  // A lidar that does not look up shows no ceiling anywhere.
+  EXPECT_FALSE(lacks_ceiling(no_houses, roofed, T));
+  // Nor one that drives by.
+  EXPECT_FALSE(lacks_ceiling(street({}), roofed, T * Eigen::Translation3d(0.0, 25.0, 0.0)));
 }
 
 }  // namespace

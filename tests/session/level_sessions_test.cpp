@@ -95,5 +95,26 @@ TEST(SessionsOnLevels, NorIsTheOneAboveALongOne) {
   EXPECT_LT(worst_m(alignment, second), 0.5);
 }
 
+/// The crossing is all that a drive over the bridge has in common with the street.
+TEST(SessionsOnLevels, ABridgeIsNotPutOnTheStreetOfTheMap) {
+  constexpr double deck_m = 5.5;
+  constexpr double low_m = deck_m - 0.07 * 36.0;
+  const levels::BoxWorld world = levels::bridge_world(3, deck_m);
+  Poses street, bridge;
+  levels::drive(street, {-50, 0, 0}, {50, 0, 0});
+  levels::drive(bridge, {0, -50, low_m}, {0, -14, deck_m});
+  levels::drive(bridge, {0, -13, deck_m}, {0, 14, deck_m});
+  levels::drive(bridge, {0, 15, deck_m}, {0, 50, low_m});
+  const SavedMap map = map_of(world, street);
+  const MapAlignment over = alignment_of(world, bridge, map);
+  EXPECT_FALSE(over.is_recognized()) << over.in_words();
+  // Who drives under the bridge sees it.
+  Poses again;
+  levels::drive(again, {-25, 0, 0}, {25, 0, 0});
+  const MapAlignment under = alignment_of(world, again, map);
+  ASSERT_TRUE(under.is_recognized()) << under.in_words();
+  EXPECT_LT(worst_m(under, again), 0.3);
+}
+
 }  // namespace
 }  // namespace stillmap
