@@ -32,10 +32,9 @@ bool slides(const std::vector<Anchor>& right, const Anchor& now, const WrongPose
   const auto after_window =
       std::upper_bound(right.begin(), right.end(), now.path_m - limits.drift_path_m,
                        [](double path_m, const Anchor& anchor) { return path_m < anchor.path_m; });
-  if (after_window == right.begin()) return false;
-  const Anchor& base = *std::prev(after_window);
+  const Anchor& base = after_window == right.begin() ? right.front() : *std::prev(after_window);
   return motion_error(base, now).translation().norm() >
-         limits.drift_share * (now.path_m - base.path_m);
+         limits.drift_share * std::max(limits.drift_path_m, now.path_m - base.path_m);
 }
 
 bool is_called_good(const EvaluatedPose& pose) {

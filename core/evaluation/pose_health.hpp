@@ -28,8 +28,9 @@ struct WrongPoseLimits {
   double translation_share = 0.02;
   double rotation_deg = 1.0;
   double rotation_deg_per_m = 0.02;
-  /// Since the newest right pose that lies at least `drift_path_m` of true path back: share of the
-  /// true path between the two. Finds drives that slide away in small steps.
+  /// Since the newest right pose that lies at least `drift_path_m` of true path back, or the first
+  /// one: share of the true path between the two, but of so long a one at least. Finds drives that
+  /// slide away in small steps, and slow ones that do not move at all.
   double drift_path_m = 20.0;
   double drift_share = 0.05;
   /// The true path from one pose to the next counts as this much at most [m]: a recording that

@@ -40,9 +40,17 @@ TEST(WrongPoses, AreNoneOfADriveThatDriftsAsUsual) {
   EXPECT_THAT(wrong_poses(straight(2000, 1.01)), Each(false));
 }
 
-TEST(WrongPoses, BeginWhereADriveThatSlidesHasGoneTheWindow) {
+TEST(WrongPoses, BeginWhereADriveThatSlidesIsAMetreOff) {
   const std::vector<bool> wrong = wrong_poses(straight(100, 1.08));
-  EXPECT_EQ(std::ranges::find(wrong, true) - wrong.begin(), 20);
+  EXPECT_EQ(std::ranges::find(wrong, true) - wrong.begin(), 13);
+  EXPECT_TRUE(wrong.back());
+}
+
+TEST(WrongPoses, BeginWhereASlowDriveThatSeemsToStandHasGoneAMetre) {
+  Drive drive;
+  for (int k = 0; k < 60; ++k) drive.push_back(evaluated(at(0.15 * k), at(0.0)));
+  const std::vector<bool> wrong = wrong_poses(drive);
+  EXPECT_EQ(std::ranges::find(wrong, true) - wrong.begin(), 7);
   EXPECT_TRUE(wrong.back());
 }
 

@@ -50,7 +50,8 @@ constexpr const char* drives_explanation =
     "A pose is wrong when the motion since the last right one is off by more than 0.2 m and 2 % "
     "of\n"
     "the path, or 1 deg and 0.02 deg a metre, or since that 20 m back by more than 5 % of the "
-    "path.\n"
+    "path\n"
+    "(less than 20 m on: by 1 m since the first one).\n"
     "Column 'wrong good': wrong poses called good; 'right lost': right ones called lost; ms: a "
     "scan\n"
     "without the time for labels, map included. --labels model takes the lidar to be upright.";
