@@ -7,6 +7,7 @@
 
 #include "core/odometry/features.hpp"
 #include "core/odometry/first_scan.hpp"
+#include "core/odometry/flat_fit.hpp"
 #include "core/odometry/motion_classification.hpp"
 #include "core/odometry/motion_limits.hpp"
 #include "core/odometry/odometry.hpp"
@@ -190,6 +191,7 @@ struct Odometry::State {
   ScanIntervals intervals;
   RegisteredScan last;
   FitStatistics fits;
+  FlatFit flat_fit;
   /// Whether scans are registered by surfaces, not by edges and planes of rings.
   bool is_by_surfaces;
   /// The scans that were not.

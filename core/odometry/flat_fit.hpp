@@ -1,0 +1,24 @@
+#pragma once
+
+#include "core/odometry/registration.hpp"
+
+namespace stillmap {
+
+/// Whether scans have lately lain as well on the local map beside their poses as where these are.
+/// Then they do not tell the pose, however many of their residuals see every direction: planes
+/// through grass, crops, or snow in the air lean every way, and hold the lidar wherever
+/// registration began. One scan alone may be chance.
+class FlatFit {
+ public:
+  /// `found`, but degenerate instead of good where this scan and those before lie as well beside.
+  /// What it says of a lost one is nothing. Not of the paper's own method.
+  [[nodiscard]] OdometryResult doubted(OdometryResult found, const FeatureSets& features,
+                                       const LocalMap& map, const OdometryConfig& config);
+
+ private:
+  /// Running mean of what the fit loses to the side, 0..1; negative where it lies better there.
+  double mean_lost_ = 0.0;
+  bool is_known_ = false;
+};
+
+}  // namespace stillmap
