@@ -349,21 +349,23 @@ Features extract_surfaces(const Scan& scan, const FeatureConfig& config,
 Features extract_features(const Scan& scan, const FeatureConfig& config,
                           const Eigen::Vector3f& up_lidar) {
   assert(scan.ring.size() == scan.size());
+  const std::vector<bool> in_air = points_in_air(scan.points_lidar);
   RingOrder rings(scan);
   std::vector<RingFeatures> of_ring(rings.count());
   tbb::parallel_for(std::size_t{0}, rings.count(), [&](std::size_t r) {
-    of_ring[r] = features_of_ring(scan, rings.ring(r), config);
+    std::span<std::uint32_t> ring = rings.ring(r);
+    // A drop between points of a surface makes edges of these.
+    if (!in_air.empty()) {
+      const auto drops = std::ranges::remove_if(ring, [&](std::uint32_t i) { return in_air[i]; });
+      ring = ring.first(ring.size() - drops.size());
+    }
+    of_ring[r] = features_of_ring(scan, ring, config);
   });
-  const std::vector<bool> in_air = points_in_air(scan.points_lidar);
   std::vector<std::uint32_t> edges;
   std::vector<std::uint32_t> planes;
   for (const RingFeatures& ring : of_ring) {
     edges.insert(edges.end(), ring.edges.begin(), ring.edges.end());
     planes.insert(planes.end(), ring.planes.begin(), ring.planes.end());
-  }
-  if (!in_air.empty()) {
-    std::erase_if(edges, [&](std::uint32_t i) { return in_air[i]; });
-    std::erase_if(planes, [&](std::uint32_t i) { return in_air[i]; });
   }
   Features features;
   features.edges = voxel_downsample(scan.points_lidar, edges, config.edge_spacing_m);

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <numbers>
+
+#include "core/odometry/isolated_points.hpp"
+#include "core/odometry/ray_density.hpp"
 
 namespace stillmap {
 namespace {
@@ -13,6 +15,10 @@ namespace {
 /// Fewer points in the air than this share of the scan are none: edges of what is near, and stray
 /// returns beside the vehicle, are up to 0.8 % of recorded scans.
 constexpr double min_share_of_scan = 0.015;
+
+/// Of drops and flakes a larger share than this is isolated: 0.75 where a tenth of all rays ends on
+/// drops within some metres, else 0.93 and more; of crops and leaves beside the lidar 0.1 to 0.57.
+constexpr double min_isolated_share = 0.66;
 
 /// Shells about the lidar, each of cubes twice as large as those of the one within: as many rays
 /// pass through a cube at its inner side.
@@ -27,41 +33,6 @@ constexpr float max_share_in_air = 0.06F;
 constexpr float cube_of_shell_m(std::uint32_t shell) {
   return first_cube_m * static_cast<float>(1U << shell);
 }
-
-/// Rays by their elevation, as if they went all round: no more than there are. The rings of many
-/// lidars lie closer together at the horizon than below it.
-class RayDensity {
- public:
-  explicit RayDensity(std::span<const Eigen::Vector3f> points) {
-    constexpr std::size_t one_of = 7;
-    std::array<std::size_t, bins> counts{};
-    for (std::size_t i = 0; i < points.size(); i += one_of) counts[bin_of(points[i])] += one_of;
-    for (std::size_t bin = 0; bin < bins; ++bin) {
-      const std::size_t first = bin == 0 ? 0 : bin - 1;
-      const std::size_t last = std::min(bin + 1, bins - 1);
-      std::size_t count = 0;
-      for (std::size_t k = first; k <= last; ++k) count += counts[k];
-      const float steradians =
-          2.0F * std::numbers::pi_v<float> * bin_sine * static_cast<float>(last - first + 1);
-      per_steradian_[bin] = static_cast<float>(count) / steradians;
-      most_per_steradian_ = std::max(most_per_steradian_, per_steradian_[bin]);
-    }
-  }
-  [[nodiscard]] float per_steradian(const Eigen::Vector3f& point) const {
-    return per_steradian_[bin_of(point)];
-  }
-  [[nodiscard]] float most_per_steradian() const { return most_per_steradian_; }
-
- private:
-  static constexpr std::size_t bins = 50;
-  static constexpr float bin_sine = 2.0F / static_cast<float>(bins);
-  static std::size_t bin_of(const Eigen::Vector3f& point) {
-    const float sine = point.z() / std::max(point.norm(), 1e-3F);
-    return std::min(static_cast<std::size_t>(std::max(sine + 1.0F, 0.0F) / bin_sine), bins - 1);
-  }
-  std::array<float, bins> per_steradian_{};
-  float most_per_steradian_ = 0.0F;
-};
 
 /// Points within reach, by cubes.
 class NearCubes {
@@ -200,6 +171,18 @@ class NearCubes {
   std::vector<std::uint8_t> is_thin_;
 };
 
+/// To the `count` points that were found, all that are isolated, unless these were thin plants.
+void add_isolated(std::span<const Eigen::Vector3f> points_lidar, RayDensity rays, std::size_t count,
+                  std::vector<bool>& in_air) {
+  rays.count_sky();
+  const std::vector<bool> isolated = isolated_points(points_lidar, rays);
+  std::size_t isolated_count = 0;
+  for (std::size_t i = 0; i < in_air.size(); ++i)
+    isolated_count += in_air[i] && isolated[i] ? 1 : 0;
+  if (static_cast<double>(isolated_count) < min_isolated_share * static_cast<double>(count)) return;
+  for (std::size_t i = 0; i < in_air.size(); ++i) in_air[i] = in_air[i] || isolated[i];
+}
+
 }  // namespace
 
 std::vector<bool> points_in_air(std::span<const Eigen::Vector3f> points_lidar) {
@@ -214,7 +197,8 @@ std::vector<bool> points_in_air(std::span<const Eigen::Vector3f> points_lidar) {
     in_air[i] = true;
     ++count;
   }
-  if (static_cast<double>(count) < few) in_air.clear();
+  if (static_cast<double>(count) < few) return {};
+  add_isolated(points_lidar, rays, count, in_air);
   return in_air;
 }
 

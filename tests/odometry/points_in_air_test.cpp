@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/odometry/features.hpp"
+#include "core/odometry/isolated_points.hpp"
 
 namespace stillmap {
 namespace {
@@ -21,27 +22,30 @@ namespace {
 /// beside it.
 struct Rain {
   std::vector<Eigen::Vector3f> points_lidar;
+  std::vector<std::uint16_t> rings;
   std::vector<bool> is_drop;
 
-  /// `share` of the rays end on drops, most of them within some metres.
-  Rain(double share, unsigned seed) {
+  /// `share` of the rays end on drops, most of them within some metres, or on flakes anywhere up to
+  /// 15 m.
+  Rain(double share, unsigned seed, bool is_snow = false) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> uniform(0.0, 1.0);
     std::exponential_distribution<double> way(1.0 / 1.5);
-    constexpr int rings = 32;
+    constexpr int ring_count = 32;
     constexpr int columns = 900;
-    for (int ring = 0; ring < rings; ++ring)
+    for (int ring = 0; ring < ring_count; ++ring)
       for (int column = 0; column < columns; ++column) {
-        const double elevation = (15.0 - 40.0 * ring / (rings - 1)) * std::numbers::pi / 180.0;
+        const double elevation = (15.0 - 40.0 * ring / (ring_count - 1)) * std::numbers::pi / 180.0;
         const double azimuth = 2.0 * std::numbers::pi * column / columns;
         const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
                                   std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
         const double range_m = range_of(ray, uniform(random));
-        const double drop_m = 0.6 + way(random);
+        const double drop_m = 0.6 + (is_snow ? 14.4 * uniform(random) : way(random));
         const bool ends_on_drop = uniform(random) < share && drop_m < range_m;
         if (!ends_on_drop && range_m > 80.0) continue;
         points_lidar.push_back(
             (std::min(range_m, drop_m + 100.0 * (ends_on_drop ? 0.0 : 1.0)) * ray).cast<float>());
+        rings.push_back(static_cast<std::uint16_t>(ring));
         is_drop.push_back(ends_on_drop);
       }
   }
@@ -74,7 +78,22 @@ TEST(PointsInAir, AreDropsAndNothingSolid) {
       if (in_air[i]) (rain.is_drop[i] ? found : mistaken) += 1.0;
     }
     EXPECT_GT(found, 0.85 * drops) << share;
-    EXPECT_LT(mistaken, 0.002 * solid) << share;
+    EXPECT_LT(mistaken, 0.003 * solid) << share;
+  }
+}
+
+TEST(PointsInAir, AreFlakesAsFarAsTheyAreSeenAndCloseAboveTheGround) {
+  for (const double share : {0.05, 0.15, 0.40}) {
+    const Rain snow(share, 9, /*is_snow=*/true);
+    const std::vector<bool> in_air = points_in_air(snow.points_lidar);
+    ASSERT_EQ(in_air.size(), snow.points_lidar.size()) << share;
+    double flakes = 0.0, found = 0.0, solid = 0.0, mistaken = 0.0;
+    for (std::size_t i = 0; i < in_air.size(); ++i) {
+      (snow.is_drop[i] ? flakes : solid) += 1.0;
+      if (in_air[i]) (snow.is_drop[i] ? found : mistaken) += 1.0;
+    }
+    EXPECT_GT(found, 0.9 * flakes) << share;
+    EXPECT_LT(mistaken, 0.02 * solid) << share;
   }
 }
 
@@ -149,14 +168,25 @@ class PlainRule {
   std::map<Cube, int> counts_;
 };
 
-TEST(PointsInAir, AreThoseOfThePlainRule) {
+TEST(PointsInAir, AreThoseOfThePlainRuleAndWhatIsIsolated) {
   for (const double share : {0.03, 0.10, 0.20}) {
     const std::vector<Eigen::Vector3f> points = Rain(share, 11).points_lidar;
     const PlainRule rule(points);
     const std::vector<bool> in_air = points_in_air(points);
     ASSERT_EQ(in_air.size(), points.size());
+    RayDensity rays(points);
+    rays.count_sky();
+    const std::vector<bool> isolated = isolated_points(points, rays);
+    double count = 0.0, isolated_count = 0.0;
     for (std::size_t i = 0; i < points.size(); ++i)
-      EXPECT_EQ(in_air[i], rule.is_in_air(points[i])) << share << ": " << points[i].transpose();
+      if (rule.is_in_air(points[i])) {
+        count += 1.0;
+        isolated_count += isolated[i] ? 1.0 : 0.0;
+      }
+    const bool are_drops = isolated_count >= 0.66 * count;
+    for (std::size_t i = 0; i < points.size(); ++i)
+      EXPECT_EQ(in_air[i], rule.is_in_air(points[i]) || (are_drops && isolated[i]))
+          << share << ": " << points[i].transpose();
   }
 }
 
@@ -224,6 +254,17 @@ TEST(ExtractSurfaces, LeavesOutWhatHangsInTheAir) {
     for (const std::uint32_t i : *kind) drops += rain.is_drop[i] ? 1.0 : 0.0;
     EXPECT_LT(drops, 0.15 * static_cast<double>(kind->size()));
   }
+}
+
+TEST(ExtractFeatures, FindsSurfacesOfRingsBetweenFlakes) {
+  const auto planes_of = [](double share) {
+    const Rain snow(share, 9, /*is_snow=*/true);
+    Scan scan;
+    scan.points_lidar = snow.points_lidar;
+    scan.ring = snow.rings;
+    return static_cast<double>(extract_features(scan, FeatureConfig{}).planes.size());
+  };
+  EXPECT_GT(planes_of(0.15), 0.7 * planes_of(0.0));
 }
 
 }  // namespace
