@@ -324,6 +324,7 @@ void Odometry::State::begin_anew(const FeatureSets& features, OdometryResult& re
   result = OdometryResult{.T_map_lidar = last.T_map_lidar};
   // Nobody knows where it is to the one before, which may be in a map.
   result.map_entry = MapEntry::stays_out;
+  result.covariance = unknown_pose_covariance();
 }
 
 void Odometry::State::forget_stretch() {

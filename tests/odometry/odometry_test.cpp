@@ -329,6 +329,7 @@ TEST_F(OdometrySequence, AFirstScanThatReplacesOneStaysOutOfTheMap) {
   ASSERT_EQ(found.health, OdometryHealth::initialised);
   // Nobody knows where it is to the one before.
   EXPECT_FALSE(found.is_confirmed());
+  EXPECT_GT(std::sqrt(found.covariance(0, 0)), 100.0);
 }
 
 /// The street, and cars that keep the lidar's pace beside and ahead of it.
