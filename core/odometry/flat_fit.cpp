@@ -19,6 +19,9 @@ constexpr double min_mean_lost = 0.015;
 /// clear again is believed soon.
 constexpr double mean_gain = 0.2;
 constexpr double max_counted_lost = 0.1;
+/// Where it has lately been as clear as this, as in streets, one scan of so many is asked.
+constexpr double clear_mean_lost = 0.085;
+constexpr int interval_where_clear = 5;
 
 }  // namespace
 
@@ -27,6 +30,8 @@ OdometryResult FlatFit::doubted(OdometryResult found, const FeatureSets& feature
   if (config.paper_exact || found.health == OdometryHealth::lost ||
       found.health == OdometryHealth::initialised)
     return found;
+  if (is_known_ && mean_lost_ >= clear_mean_lost && ++unasked_ < interval_where_clear) return found;
+  unasked_ = 0;
   const FeatureSets some = downsampled(features);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> level(
       found.covariance.topLeftCorner<2, 2>());

@@ -19,6 +19,8 @@ class FlatFit {
   /// Running mean of what the fit loses to the side, 0..1; negative where it lies better there.
   double mean_lost_ = 0.0;
   bool is_known_ = false;
+  /// Scans since it was asked for last.
+  int unasked_ = 0;
 };
 
 }  // namespace stillmap
