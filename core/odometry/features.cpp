@@ -22,12 +22,39 @@
 namespace stillmap {
 namespace {
 
-constexpr std::size_t half_window = 5;
 constexpr std::size_t sectors = 6;
 /// A step along a ring larger than this share of the range is a jump in depth, not a surface.
 constexpr float jump_share = 0.1F;
 /// A picked edge covers its neighbours up to a squared step of this size [m^2] (A-LOAM).
 constexpr float same_edge_step_m2 = 0.05F;
+
+/// What is next to a point on its ring, by how far apart the ring's rays are.
+struct RingSpacing {
+  /// Neighbours to each side that tell how the ring bends: LOAM's five at a fifth of a degree.
+  std::size_t half_window = 5;
+  /// A surface is grazed where both steps on it are longer than this share of the range, squared.
+  float grazing_share2 = 0.0002F;
+};
+
+/// Fewer neighbours where rays are farther apart: what ten of them span is no one surface, and a
+/// flat wall seen at an angle, whose points lie the farther apart the farther they are, bends as an
+/// edge does. Steps that are long because the rays are far apart graze nothing, either.
+RingSpacing spacing_of(std::span<const Eigen::Vector3f> ring) {
+  /// Angles to the neighbours of one side, added up.
+  constexpr float max_angles_rad = 0.055F;
+  /// A surface at 30 degrees to the beam: its steps are so many times those of one that faces it.
+  constexpr float grazing_steps = 2.0F;
+  const float step_rad = ray_step_rad(ring);
+  const auto angles_rad = [&](std::size_t neighbours) {
+    return 0.5F * static_cast<float>(neighbours * (neighbours + 1)) * step_rad;
+  };
+  RingSpacing spacing;
+  while (spacing.half_window > 1 && angles_rad(spacing.half_window) > max_angles_rad)
+    --spacing.half_window;
+  const float grazing_share = grazing_steps * step_rad;
+  spacing.grazing_share2 = std::max(spacing.grazing_share2, grazing_share * grazing_share);
+  return spacing;
+}
 
 /// Whether the azimuth runs one way along the ring, but for the noise of motion compensation.
 bool runs_round(const std::vector<Eigen::Vector3f>& points, std::span<const std::uint32_t> ring) {
@@ -50,7 +77,7 @@ enum class Use : std::uint8_t { free, taken, edge };
 
 /// Keeps neighbours of a picked edge on the same surface from being picked too.
 void cover_neighbours(std::span<const Eigen::Vector3f> ring, std::size_t picked,
-                      std::vector<Use>& use) {
+                      std::size_t half_window, std::vector<Use>& use) {
   for (const int direction : {-1, 1}) {
     std::size_t i = picked;
     for (std::size_t step = 0; step < half_window; ++step) {
@@ -69,7 +96,7 @@ struct RingFeatures {
 };
 
 void pick_edges(std::span<const Eigen::Vector3f> ring, std::span<const float> curvature,
-                const FeatureConfig& config, std::vector<Use>& use) {
+                std::size_t half_window, const FeatureConfig& config, std::vector<Use>& use) {
   std::vector<std::uint32_t> sharp;
   for (std::size_t sector = 0; sector < sectors; ++sector) {
     const std::size_t first = ring.size() * sector / sectors;
@@ -87,33 +114,16 @@ void pick_edges(std::span<const Eigen::Vector3f> ring, std::span<const float> cu
       if (use[i] != Use::free) continue;
       use[i] = Use::edge;
       ++picked;
-      cover_neighbours(ring, i, use);
+      cover_neighbours(ring, i, half_window, use);
     }
   }
 }
 
-RingFeatures features_of_ring(const Scan& scan, std::span<std::uint32_t> order,
-                              const FeatureConfig& config) {
-  RingFeatures features;
-  if (order.size() <= 2 * half_window) return features;
-  if (!runs_round(scan.points_lidar, order)) sort_by_azimuth(scan.points_lidar, order);
-  std::vector<Eigen::Vector3f> ring(order.size());
-  std::ranges::transform(order, ring.begin(), [&](auto i) { return scan.points_lidar[i]; });
-  const std::vector<float> curvature = ring_curvature(ring);
-  std::vector<Use> use(ring.size(), Use::free);
-  pick_edges(ring, curvature, config, use);
-  for (std::size_t i = 0; i < ring.size(); ++i) {
-    if (use[i] == Use::edge)
-      features.edges.push_back(order[i]);
-    else if (curvature[i] < static_cast<float>(config.plane_curvature_m2))
-      features.planes.push_back(order[i]);
-  }
-  return features;
-}
-
 /// Marks the far side of a jump in depth, which the near side may hide from another place, and
 /// points on surfaces that the beam grazes: both change with the place of the lidar.
-std::vector<bool> unreliable_points(std::span<const Eigen::Vector3f> ring) {
+std::vector<bool> unreliable_points(std::span<const Eigen::Vector3f> ring,
+                                    const RingSpacing& spacing) {
+  const std::size_t half_window = spacing.half_window;
   std::vector<bool> unreliable(ring.size(), false);
   for (std::size_t i = 0; i + 1 < ring.size(); ++i) {
     const float range = ring[i].norm();
@@ -126,7 +136,7 @@ std::vector<bool> unreliable_points(std::span<const Eigen::Vector3f> ring) {
     for (std::size_t k = first; k <= last; ++k) unreliable[k] = true;
   }
   for (std::size_t i = 1; i + 1 < ring.size(); ++i) {
-    const float grazing = 0.0002F * ring[i].squaredNorm();
+    const float grazing = spacing.grazing_share2 * ring[i].squaredNorm();
     if ((ring[i] - ring[i - 1]).squaredNorm() > grazing &&
         (ring[i + 1] - ring[i]).squaredNorm() > grazing)
       unreliable[i] = true;
@@ -134,12 +144,12 @@ std::vector<bool> unreliable_points(std::span<const Eigen::Vector3f> ring) {
   return unreliable;
 }
 
-}  // namespace
-
-std::vector<float> ring_curvature(const std::vector<Eigen::Vector3f>& ring) {
+/// ring_curvature() of a ring whose spacing is known.
+std::vector<float> curvature_of(std::span<const Eigen::Vector3f> ring, const RingSpacing& spacing) {
+  const std::size_t half_window = spacing.half_window;
   std::vector<float> curvature(ring.size(), std::numeric_limits<float>::quiet_NaN());
   if (ring.size() <= 2 * half_window) return curvature;
-  const std::vector<bool> unreliable = unreliable_points(ring);
+  const std::vector<bool> unreliable = unreliable_points(ring, spacing);
   for (std::size_t i = half_window; i + half_window < ring.size(); ++i) {
     if (unreliable[i]) continue;
     Eigen::Vector3f sum = -static_cast<float>(2 * half_window) * ring[i];
@@ -147,6 +157,32 @@ std::vector<float> ring_curvature(const std::vector<Eigen::Vector3f>& ring) {
     curvature[i] = sum.squaredNorm();
   }
   return curvature;
+}
+
+RingFeatures features_of_ring(const Scan& scan, std::span<std::uint32_t> order,
+                              const FeatureConfig& config) {
+  RingFeatures features;
+  if (order.empty()) return features;
+  if (!runs_round(scan.points_lidar, order)) sort_by_azimuth(scan.points_lidar, order);
+  std::vector<Eigen::Vector3f> ring(order.size());
+  std::ranges::transform(order, ring.begin(), [&](auto i) { return scan.points_lidar[i]; });
+  const RingSpacing spacing = spacing_of(ring);
+  const std::vector<float> curvature = curvature_of(ring, spacing);
+  std::vector<Use> use(ring.size(), Use::free);
+  pick_edges(ring, curvature, spacing.half_window, config, use);
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    if (use[i] == Use::edge)
+      features.edges.push_back(order[i]);
+    else if (curvature[i] < static_cast<float>(config.plane_curvature_m2))
+      features.planes.push_back(order[i]);
+  }
+  return features;
+}
+
+}  // namespace
+
+std::vector<float> ring_curvature(const std::vector<Eigen::Vector3f>& ring) {
+  return curvature_of(ring, spacing_of(ring));
 }
 
 std::vector<std::uint32_t> few_surfaces(const Scan& scan, const FeatureConfig& config,

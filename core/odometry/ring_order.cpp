@@ -1,5 +1,6 @@
 #include "core/odometry/ring_order.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cassert>
 #include <numeric>
@@ -15,6 +16,25 @@ RingOrder::RingOrder(const Scan& scan) : order_(scan.size()) {
   std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
   std::vector<std::uint32_t> next(begin_.begin(), begin_.end());
   for (std::uint32_t i = 0; i < scan.size(); ++i) order_[next[scan.ring[i]]++] = i;
+}
+
+float ray_step_rad(std::span<const Eigen::Vector3f> ring_lidar) {
+  constexpr float same_ray_rad = 1e-4F;
+  // So many tell.
+  constexpr std::size_t enough = 200;
+  const std::size_t stride = std::max<std::size_t>(1, ring_lidar.size() / enough);
+  std::vector<float> steps_rad;
+  steps_rad.reserve(ring_lidar.size() / stride + 1);
+  for (std::size_t i = 1; i < ring_lidar.size(); i += stride) {
+    const Eigen::Vector3f& before = ring_lidar[i - 1];
+    const Eigen::Vector3f& here = ring_lidar[i];
+    const float sine = before.cross(here).norm() / (before.norm() * here.norm());
+    if (sine > same_ray_rad) steps_rad.push_back(sine);
+  }
+  if (steps_rad.empty()) return 0.0F;
+  const auto middle = steps_rad.begin() + static_cast<std::ptrdiff_t>(steps_rad.size() / 2);
+  std::ranges::nth_element(steps_rad, middle);
+  return *middle;
 }
 
 }  // namespace stillmap

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -28,5 +29,9 @@ class RingOrder {
   /// Ring r is order_[begin_[r] .. begin_[r + 1]).
   std::vector<std::uint32_t> begin_;
 };
+
+/// Angle between neighbouring rays of a ring, whose points are in firing order [rad]: that of most,
+/// since some do not return, or return twice. 0 of fewer than two points.
+[[nodiscard]] float ray_step_rad(std::span<const Eigen::Vector3f> ring_lidar);
 
 }  // namespace stillmap

@@ -23,11 +23,11 @@ constexpr double step = 0.2 * degree;
 
 /// One level ring: `range_m(azimuth)` of what the beam meets; 0 for no return.
 Scan ring_scan(double from, double to, const std::function<double(double)>& range_m,
-               std::uint16_t ring = 0, float height_m = 0.0F) {
+               std::uint16_t ring = 0, float height_m = 0.0F, double step_rad = step) {
   Scan scan;
-  const auto shots = static_cast<int>(std::lround((to - from) / step));
+  const auto shots = static_cast<int>(std::lround((to - from) / step_rad));
   for (int k = 0; k < shots; ++k) {
-    const double azimuth = from + (k + 0.5) * step;
+    const double azimuth = from + (k + 0.5) * step_rad;
     const double range = range_m(azimuth);
     if (range == 0.0) continue;
     scan.points_lidar.emplace_back(static_cast<float>(range * std::cos(azimuth)),
@@ -112,6 +112,31 @@ TEST(ExtractFeatures, GrazedSurfaceIsRejected) {
   EXPECT_THAT(features.edges, IsEmpty());
   ASSERT_FALSE(features.planes.empty());
   for (const std::uint32_t i : features.planes) EXPECT_LT(scan.points_lidar[i].x(), 5.0F);
+}
+
+TEST(ExtractFeatures, AFlatWallIsOnePlaneHoweverFarApartItsColumnsAre) {
+  for (const double step_degrees : {0.1, 0.2, 0.4, 0.7, 1.0, 2.0}) {
+    const Scan scan = ring_scan(
+        -80.0 * degree, 80.0 * degree, [](double azimuth) { return 8.0 / std::cos(azimuth); }, 0,
+        0.0F, step_degrees * degree);
+    const Features features = extract_features(scan, FeatureConfig{});
+    EXPECT_THAT(features.edges, IsEmpty()) << step_degrees;
+    // 16 m of it face the lidar by 45 degrees or more, in cubes of 0.5 m.
+    EXPECT_GE(features.planes.size(), 25U) << step_degrees;
+  }
+}
+
+TEST(ExtractFeatures, APostIsAnEdgeHoweverFarApartColumnsAre) {
+  for (const double step_degrees : {0.2, 0.5, 1.0, 2.0}) {
+    const auto post = [&](double azimuth) {
+      return std::abs(azimuth) < 0.75 * step_degrees * degree ? 4.0 : 8.0 / std::cos(azimuth);
+    };
+    const Scan scan =
+        ring_scan(-30.0 * degree, 30.0 * degree, post, 0, 0.0F, step_degrees * degree);
+    const Features features = extract_features(scan, FeatureConfig{});
+    ASSERT_FALSE(features.edges.empty()) << step_degrees;
+    for (const std::uint32_t i : features.edges) EXPECT_LT(scan.points_lidar[i].x(), 5.0F);
+  }
 }
 
 TEST(ExtractFeatures, ShuffledPointsGiveTheSameSets) {
