@@ -149,8 +149,8 @@ void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& predi
       parts.features.point_tangents =
           ring_tangents(parts.scan, parts.features.upright_points, steps_on_near_walls);
     if (!is_by_surfaces) return;
-    // A young map, or one that was made earlier, has too few other points to go by.
-    if (fits.are_known() && !parts.scan.ring.empty())
+    // One that was made earlier has too few other points to go by.
+    if ((fits.are_known() || !has_prior_map) && !parts.scan.ring.empty())
       parts.features.tangents = ring_tangents(parts.scan, parts.features.surfaces);
     if (prediction.is_known && fits.are_known())
       parts.few_surfaces = few_surfaces(parts.scan, config.features, parts.features);
