@@ -30,7 +30,7 @@ constexpr float same_edge_step_m2 = 0.05F;
 
 /// What is next to a point on its ring, by how far apart the ring's rays are.
 struct RingSpacing {
-  /// Neighbours to each side that tell how the ring bends: LOAM's five at a fifth of a degree.
+  /// Neighbours to each side that tell how the ring bends: LOAM's five up to half a degree.
   std::size_t half_window = 5;
   /// A surface is grazed where both steps on it are longer than this share of the range, squared.
   float grazing_share2 = 0.0002F;
@@ -44,11 +44,14 @@ RingSpacing spacing_of(std::span<const Eigen::Vector3f> ring) {
   constexpr float max_angles_rad = 0.055F;
   /// A surface at 30 degrees to the beam: its steps are so many times those of one that faces it.
   constexpr float grazing_steps = 2.0F;
+  /// Up to half a degree all that is as LOAM has it.
+  constexpr float fine_step_rad = 0.009F;
   const float step_rad = ray_step_rad(ring);
   const auto angles_rad = [&](std::size_t neighbours) {
     return 0.5F * static_cast<float>(neighbours * (neighbours + 1)) * step_rad;
   };
   RingSpacing spacing;
+  if (step_rad <= fine_step_rad) return spacing;
   while (spacing.half_window > 1 && angles_rad(spacing.half_window) > max_angles_rad)
     --spacing.half_window;
   const float grazing_share = grazing_steps * step_rad;
