@@ -2,6 +2,8 @@
 
 #include <dlfcn.h>
 
+#include <array>
+#include <functional>
 #include <mutex>
 #include <string>
 
@@ -14,7 +16,8 @@ class ParticipantProxyData;
 
 namespace security {
 
-class SecurityManager {
+// Seen by the library also where a build hides what a program does not export.
+class __attribute__((visibility("default"))) SecurityManager {
   void match_builtin_endpoints(const ParticipantProxyData& peer);
 };
 
@@ -27,16 +30,20 @@ class SecurityManager {
 /// and one for unicast say, and in a domain of several others two of them discover two peers at the
 /// same time: one of the peers gets the name or the addresses of the other, or none, its handshake
 /// never ends, and neither side hears the other as long as both live. (Mended in Fast DDS 2.6.5,
-/// 2.8.2, 2.9.2 and 2.10: its pull request 3362.) So only one thread at a time gets in.
-void SecurityManager::match_builtin_endpoints(const ParticipantProxyData& peer) {
+/// 2.8.2, 2.9.2 and 2.10: its pull request 3362.) So only one thread at a time gets in. Weak: where
+/// Fast DDS is linked into the program, its own is taken.
+__attribute__((weak)) void SecurityManager::match_builtin_endpoints(
+    const ParticipantProxyData& peer) {
   using OfFastDds = void (*)(SecurityManager*, const ParticipantProxyData&);
   static const auto of_fast_dds = reinterpret_cast<OfFastDds>(
       ::dlsym(RTLD_NEXT,
               "_ZN8eprosima8fastrtps4rtps8security15SecurityManager23match_builtin_endpointsERKNS1_"
               "20ParticipantProxyDataE"));
+  // Each participant has a manager of its own: one that is held up shall hold up few others.
   // Nothing is sent meanwhile, and no callback of ours is called.
-  static std::mutex one_at_a_time;
-  const std::scoped_lock lock(one_at_a_time);
+  static std::array<std::mutex, 64> one_at_a_time;
+  const std::size_t turn = std::hash<SecurityManager*>{}(this) / 64 % one_at_a_time.size();
+  const std::scoped_lock lock(one_at_a_time[turn]);
   of_fast_dds(this, peer);
 }
 
