@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include "core/graph/ceiling.hpp"
 #include "core/odometry/se3.hpp"
 
 namespace stillmap {
@@ -37,50 +38,6 @@ Submap without_points(const Submap& submap) {
           .T_submap_key = submap.T_submap_key,
           .points_submap = {},
           .classes = {}};
-}
-
-/// The place of these that is nearest to the point from above. There is one at least.
-const Eigen::Vector3d& nearest_of(const std::vector<Eigen::Vector3d>& way,
-                                  const Eigen::Vector3d& point) {
-  return *std::ranges::min_element(way, {}, [&](const Eigen::Vector3d& place) {
-    return (place - point).head<2>().squaredNorm();
-  });
-}
-
-/// Whether a lidar that came along `own_way` would have seen a storey or a bridge over `other_way`,
-/// and saw none: beams that rise met walls and trees beside its way, and next to nothing over the
-/// other. Places of the lidars, in the submap's frame [m].
-bool is_open_above(const Submap& submap, const std::vector<Eigen::Vector3d>& own_way,
-                   const std::vector<Eigen::Vector3d>& other_way) {
-  // A deck of 4.5 m over the street is 3 m over a lidar on a car: at 20 m, 8 degrees up.
-  constexpr double min_rise = 0.14;
-  constexpr std::size_t min_points_up = 50;
-  constexpr double lowest_over_m = 0.7;
-  constexpr double highest_over_m = 8.0;
-  constexpr double way_width_m = 1.5;
-  // Farther from its own way it may not have seen what is there.
-  constexpr double max_aside_m = 15.0;
-  constexpr std::size_t min_places = 10;
-  // Of places: a lamp hangs over one.
-  constexpr std::size_t one_covered_of = 20;
-  std::vector<Eigen::Vector3d> seen;
-  for (const Eigen::Vector3d& place : other_way)
-    if ((nearest_of(own_way, place) - place).head<2>().norm() < max_aside_m) seen.push_back(place);
-  if (seen.size() < min_places) return false;
-  std::vector<bool> is_covered(seen.size());
-  std::size_t points_up = 0;
-  for (const Eigen::Vector3f& point : submap.points_submap) {
-    const Eigen::Vector3d p = point.cast<double>();
-    const Eigen::Vector3d from_own = p - nearest_of(own_way, p);
-    if (from_own.z() > min_rise * from_own.head<2>().norm()) ++points_up;
-    const Eigen::Vector3d& below = nearest_of(seen, p);
-    const Eigen::Vector3d over = p - below;
-    if (over.z() > lowest_over_m && over.z() < highest_over_m &&
-        over.head<2>().norm() < way_width_m)
-      is_covered[static_cast<std::size_t>(&below - seen.data())] = true;
-  }
-  const auto covered = static_cast<std::size_t>(std::ranges::count(is_covered, true));
-  return points_up >= min_points_up && covered * one_covered_of <= seen.size();
 }
 
 double angle_of(const Eigen::Isometry3d& T) { return so3_log(T.linear()).norm(); }
@@ -265,28 +222,38 @@ std::optional<LoopCloser::Candidate> LoopCloser::verify(std::size_t from, std::s
                    .to = to,
                    .closure = std::move(closure),
                    .edge = edge,
-                   .is_open_above = are_open_above(a, b, match->T_a_b)};
+                   .is_open_above = are_open_above(a, b, match->T_a_b, T_a_b_expected)};
 }
 
 std::vector<Eigen::Vector3d> LoopCloser::way_along(const PlacedSubmap& placed) const {
   const Eigen::Isometry3d T_submap_map = T_map_submap(placed).inverse();
   std::vector<Eigen::Vector3d> way;
-  for (std::size_t n = 0; n < nodes_.size(); ++n)
-    if (std::abs(nodes_[n].way_m - placed.submap.way_m) <= 0.5 * config_.submap.length_m)
-      way.push_back(T_submap_map * graph_.T_map_node[n].translation());
+  for (std::size_t n = 0; n < nodes_.size(); ++n) {
+    if (std::abs(nodes_[n].way_m - placed.submap.way_m) > 0.5 * config_.submap.length_m) continue;
+    // Nodes of a lidar that turns on the spot are at one place.
+    const Eigen::Vector3d place = T_submap_map * graph_.T_map_node[n].translation();
+    if (way.empty() || (place - way.back()).norm() >= 0.5 * config_.node_spacing_m)
+      way.push_back(place);
+  }
   return way;
 }
 
 bool LoopCloser::are_open_above(const PlacedSubmap& a, const PlacedSubmap& b,
-                                const Eigen::Isometry3d& T_a_b) const {
+                                const Eigen::Isometry3d& T_a_b,
+                                const Eigen::Isometry3d& T_a_b_expected) const {
+  // A terrace beside the street has no way over or under it.
+  constexpr double max_aside_m = 5.0;
+  const Eigen::Vector3d jump_m = T_a_b.translation() - T_a_b_expected.translation();
+  if (jump_m.head<2>().norm() > max_aside_m) return false;
+  const double height_m = std::abs(jump_m.z());
   const std::vector<Eigen::Vector3d> way_a = way_along(a);
   const std::vector<Eigen::Vector3d> way_b = way_along(b);
   const auto moved = [](std::vector<Eigen::Vector3d> way, const Eigen::Isometry3d& T) {
     for (Eigen::Vector3d& place : way) place = T * place;
     return way;
   };
-  return is_open_above(a.submap, way_a, moved(way_b, T_a_b)) &&
-         is_open_above(b.submap, way_b, moved(way_a, T_a_b.inverse()));
+  return is_open_above(a.submap, way_a, moved(way_b, T_a_b), height_m) &&
+         is_open_above(b.submap, way_b, moved(way_a, T_a_b.inverse()), height_m);
 }
 
 bool LoopCloser::is_denied(std::size_t from, std::size_t to) const {
@@ -353,6 +320,8 @@ std::vector<std::size_t> LoopCloser::enough_agreeing(const Candidate& candidate)
   double extent_m = 0.0;
   for (std::size_t k = pending_.size(); k-- > 0;) {
     const auto agrees = [&](std::size_t later) { return agree(pending_[later], pending_[k]); };
+    // One that shows something above waits for more of the way, with whom it may agree.
+    if (!needs_extent && leads_to_other_level(pending_[k])) continue;
     if (pending_[k].to == candidate.to ||
         !(agree(candidate, pending_[k]) || (needs_extent && std::ranges::any_of(agreeing, agrees))))
       continue;

@@ -199,7 +199,7 @@ class LoopCloser {
     std::size_t to = 0;
     LoopClosure closure;
     PoseEdge edge;
-    /// Both submaps show that nothing leads over the other's way: they are no two levels.
+    /// Both submaps show that nothing leads over the other's way: neither lies over the other.
     bool is_open_above = false;
   };
 
@@ -221,7 +221,8 @@ class LoopCloser {
   [[nodiscard]] std::vector<Eigen::Vector3d> way_along(const PlacedSubmap& placed) const;
   /// Whether each of the two would show what leads over the way of the other, and shows nothing.
   [[nodiscard]] bool are_open_above(const PlacedSubmap& a, const PlacedSubmap& b,
-                                    const Eigen::Isometry3d& T_a_b) const;
+                                    const Eigen::Isometry3d& T_a_b,
+                                    const Eigen::Isometry3d& T_a_b_expected) const;
   [[nodiscard]] bool is_denied(std::size_t from, std::size_t to) const;
   /// Whether the scan of this number is of this submap or one of its neighbours.
   [[nodiscard]] bool is_about(std::size_t number, std::size_t submap) const;

@@ -15,6 +15,8 @@ namespace {
 constexpr double same_pose_m = 0.3;
 /// No storey is lower than this [m].
 constexpr double min_storey_m = 1.0;
+/// From a ceiling to the floor above it, at least [m].
+constexpr double slab_m = 0.3;
 
 Eigen::Isometry2d in_plan(const Eigen::Isometry3d& T) {
   const Eigen::Vector3d ahead = T.linear().col(0);
@@ -42,15 +44,15 @@ std::string fault_of(const OdometryResult& found, const SubmapMatchConfig& confi
 }
 
 /// Whether the place, which is higher by this than where b was expected in a, is as likely the
-/// storey beside that: there is a ceiling over the lower one of both, and half of its height is
-/// nearer to the floor above.
+/// storey beside that: there is a ceiling over the lower one of both, and the floor above it is
+/// nearer to where b was expected.
 bool may_be_other_storey(const PlacedSubmap& a, const PlacedSubmap& b,
                          const Eigen::Isometry3d& T_a_b, double height_m) {
   const Eigen::Isometry2d plan = in_plan(T_a_b);
   // Expected above a, or below it.
   const auto ceiling_m =
       height_m < 0.0 ? ceiling_height_m(a, b, plan.inverse()) : ceiling_height_m(b, a, plan);
-  return ceiling_m && std::abs(height_m) > 0.5 * *ceiling_m;
+  return ceiling_m && std::abs(height_m) > 0.5 * (*ceiling_m + slab_m);
 }
 
 }  // namespace

@@ -56,7 +56,10 @@ TEST(Ceiling, IsNoSkyNorWallsCarsAndBranches) {
   const auto walls = [](float, float) { return std::vector<float>{0.7F, 1.2F, 1.7F, 2.2F}; };
   const auto cars = [](float, float) { return std::vector<float>{1.4F}; };
   const auto branches = [&](float, float) { return std::vector<float>{height_m(random)}; };
-  for (const Above& above : {Above(sky), Above(walls), Above(cars), Above(branches)})
+  // Of a crown, what a lidar sees of it whose highest beam is level.
+  std::uniform_real_distribution<float> low_m(1.85F, 3.2F);
+  const auto crowns = [&](float, float) { return std::vector<float>{low_m(random)}; };
+  for (const Above& above : {Above(sky), Above(walls), Above(cars), Above(branches), Above(crowns)})
     EXPECT_FALSE(ceiling_of(submap_of(0.0F, above)));
 }
 
@@ -84,6 +87,16 @@ TEST(Ceiling, IsMissedByWhoDroveOnAnotherLevel) {
   EXPECT_TRUE(lacks_ceiling(street({}), roofed, T));
   EXPECT_FALSE(lacks_ceiling(roofed, roofed, T));
   EXPECT_FALSE(lacks_ceiling(roofed, street({}), T));
+  // Nor is it, where the lidar does not look up so steeply that it must have seen it.
+  const Submap low_view = [&] {
+    Submap seen = street({});
+    std::erase_if(seen.points_submap, [](const Eigen::Vector3f& p) {
+      return p.z() > 0.15F * std::hypot(std::abs(p.x()) + 12.5F, p.y());
+    });
+    seen.classes.resize(seen.points_submap.size());
+    return seen;
+  }();
+  EXPECT_FALSE(lacks_ceiling(low_view, roofed, T));
   // A lidar that does not look up shows no ceiling anywhere.
   EXPECT_FALSE(lacks_ceiling(no_houses, roofed, T));
   // Nor one that drives by.

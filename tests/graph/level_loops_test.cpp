@@ -15,6 +15,7 @@ using levels::car_park;
 using levels::drive;
 using levels::drive_away;
 using levels::drive_round;
+using levels::viaduct_world;
 
 /// Closures of a drive, and how far off the worst of them is.
 struct Closures {
@@ -54,6 +55,27 @@ TEST(LoopsOnLevels, ABridgeIsNotTheStreetThatLeadsUnderIt) {
   drive(poses, {0, -13, deck_m}, {0, 14, deck_m});
   drive(poses, {0, 15, deck_m}, {0, 60, low_m});
   EXPECT_LT(closures_of(world, poses).worst_m, 0.3);
+}
+
+/// Of a drive under a viaduct, away, and along it.
+Closures closures_of_viaduct(double deck_m, double away_m, double highest_beam_deg,
+                             double span_deg) {
+  BoxWorld world = viaduct_world(2, deck_m);
+  world.highest_beam_deg = highest_beam_deg;
+  world.span_deg = span_deg;
+  std::vector<Eigen::Isometry3d> poses;
+  drive(poses, {-33, 0, 0}, {33, 0, 0});
+  drive_away(poses, away_m);
+  drive(poses, {-33, 0, deck_m}, {33, 0, deck_m});
+  return closures_of(world, poses);
+}
+
+TEST(LoopsOnLevels, AViaductIsNotTheStreetUnderneathWhateverTheLidarSeesOfIt) {
+  // From 4 degrees on it begins to see walls beside itself; from 8.5 on the deck, now and then.
+  for (const double highest_beam_deg : {2.0, 4.0, 7.0, 8.5, 9.5, 15.0})
+    EXPECT_LT(closures_of_viaduct(5.5, 700, highest_beam_deg, 20.0).worst_m, 0.3)
+        << highest_beam_deg;
+  EXPECT_LT(closures_of_viaduct(10.5, 2200, 15.0, 30.0).worst_m, 0.3);
 }
 
 TEST(LoopsOnLevels, StoreysOfACarParkAreNotOneAnother) {

@@ -23,13 +23,16 @@ constexpr double max_range_m = 60.0;
 /// Boxes that a lidar of 24 rings sees.
 class BoxWorld : public test::Boxes {
  public:
+  double highest_beam_deg = 15.0;
+  double span_deg = 40.0;
+
   [[nodiscard]] LabelledScan scan_at(const Eigen::Isometry3d& T_map_lidar,
                                      std::uint64_t seed) const {
     std::mt19937_64 random(seed);
     std::normal_distribution<double> noise_m(0.0, 0.01);
     LabelledScan scan;
     for (int ring = 0; ring < 24; ++ring) {
-      const double elevation = (15.0 - 40.0 * ring / 23.0) * rad_per_deg;
+      const double elevation = (highest_beam_deg - span_deg * ring / 23.0) * rad_per_deg;
       for (int k = 0; k < 360; ++k) {
         const Eigen::Vector3d ray = test::ray_at(elevation, k * rad_per_deg);
         const double hit_m = range_m(T_map_lidar.translation(), T_map_lidar.linear() * ray);
@@ -90,6 +93,29 @@ inline BoxWorld bridge_world(std::uint64_t seed, double deck_m) {
         if (w > 24.0 || face_m < 24.0) box(true), box(false);
         w += width_m;
       }
+    }
+  }
+  return world;
+}
+
+/// A street of houses along x, 60 m of it under a viaduct that is as long.
+inline BoxWorld viaduct_world(std::uint64_t seed, double deck_m) {
+  BoxWorld world;
+  world.add({-150, -150, -1}, {150, 150, 0});
+  world.add({-35, -4.5, deck_m - 0.8}, {35, 4.5, deck_m});
+  for (const double y : {-4.5, 4.3}) world.add({-35, y, deck_m}, {35, y + 0.2, deck_m + 0.9});
+  for (const double x : {-35.0, -12.0, 12.0, 34.0})
+    for (const double y : {-4.5, 3.9}) world.add({x, y, 0}, {x + 0.6, y + 0.6, deck_m - 0.8});
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> share(0.0, 1.0);
+  for (const double side : {-1.0, 1.0}) {
+    for (double x = -90.0; x < 90.0;) {
+      const double width_m = 5.0 + 8.0 * share(random);
+      const double near_m = side * (7.0 + share(random));
+      const double far_m = near_m + side * 6.0;
+      const double high_m = deck_m + 8.0 + 6.0 * share(random);
+      world.add({x, std::min(near_m, far_m), 0}, {x + width_m, std::max(near_m, far_m), high_m});
+      x += width_m + 1.0 + 2.0 * share(random);
     }
   }
   return world;
