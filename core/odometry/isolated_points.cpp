@@ -1,7 +1,12 @@
 #include "core/odometry/isolated_points.hpp"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstdint>
+#include <numbers>
 
 namespace stillmap {
 namespace {
@@ -24,12 +29,18 @@ float angle_of(float per_steradian) {
   return std::clamp(angle_rad, min_angle_rad, max_angle_rad);
 }
 
-/// Points by their direction: those of one cell, and the 26 round it, are all within an angle of a
-/// direction in it.
+/// Points by their direction: those of one cell, and the 26 round it, are all that are within an
+/// angle of a direction in it.
 class Directions {
  public:
-  explicit Directions(std::span<const Eigen::Vector3f> points)
-      : cells_(points.size()), order_(points.size()), begins_(side * side * side + 1) {
+  Directions(std::span<const Eigen::Vector3f> points, float angle_rad)
+      : cells_to_axis_end_(
+            std::clamp(static_cast<std::size_t>(1.0F / angle_rad), min_cells, max_cells)),
+        side_(2 * cells_to_axis_end_ + 3),
+        neighbours_(neighbours(static_cast<std::int64_t>(side_))),
+        cells_(points.size()),
+        order_(points.size()),
+        begins_(side_ * side_ * side_ + 1) {
     for (std::size_t i = 0; i < points.size(); ++i) {
       cells_[i] = cell_of(points[i]);
       ++begins_[cells_[i] + 1];
@@ -40,6 +51,9 @@ class Directions {
       order_[next[cells_[i]]++] = static_cast<std::uint32_t>(i);
   }
 
+  /// Of a cell, from the origin [rad].
+  [[nodiscard]] float angle_rad() const { return 1.0F / static_cast<float>(cells_to_axis_end_); }
+
   /// Whether fewer than `enough_near` other points are within `distance_m` of the i-th.
   [[nodiscard]] bool is_alone(std::span<const Eigen::Vector3f> points, std::size_t i,
                               float distance_m) const {
@@ -47,7 +61,7 @@ class Directions {
     const float squared_m2 = distance_m * distance_m;
     const auto middle = static_cast<std::int64_t>(cells_[i]);
     // The own cell first: most points are on something, and have enough of it there.
-    for (const std::int64_t step : neighbours()) {
+    for (const std::int64_t step : neighbours_) {
       const auto cell = static_cast<std::size_t>(middle + step);
       for (std::uint32_t k = begins_[cell]; k < begins_[cell + 1]; ++k) {
         const std::uint32_t other = order_[k];
@@ -59,50 +73,76 @@ class Directions {
   }
 
  private:
-  /// Along an edge of the cube round all directions, with one cell beyond them at each end.
-  static constexpr std::size_t cells_to_axis_end = 17;
-  static constexpr std::size_t side = 2 * cells_to_axis_end + 3;
-  static_assert(1.0F / cells_to_axis_end < max_angle_rad);
+  static constexpr std::size_t min_cells = 16;
+  /// More of them take longer to clear than the points in them to look at.
+  static constexpr std::size_t max_cells = 40;
+  static_assert(1.0F / min_cells >= max_angle_rad);
 
-  static std::size_t cell_of(const Eigen::Vector3f& point) {
+  [[nodiscard]] std::size_t cell_of(const Eigen::Vector3f& point) const {
     const Eigen::Vector3f direction = point / std::max(point.norm(), 1e-3F);
-    const auto along = [](float part) {
-      const float cells = (part + 1.0F) * static_cast<float>(cells_to_axis_end);
-      return 1 + std::min(static_cast<std::size_t>(std::max(cells, 0.0F)), side - 3);
+    const auto along = [this](float part) {
+      const float cells = (part + 1.0F) * static_cast<float>(cells_to_axis_end_);
+      return 1 + std::min(static_cast<std::size_t>(std::max(cells, 0.0F)), side_ - 3);
     };
-    return (along(direction.z()) * side + along(direction.y())) * side + along(direction.x());
+    return (along(direction.z()) * side_ + along(direction.y())) * side_ + along(direction.x());
   }
-  static const std::array<std::int64_t, 27>& neighbours() {
-    static const auto steps = [] {
-      std::array<std::int64_t, 27> all{};
-      std::size_t k = 1;
-      constexpr auto row = static_cast<std::int64_t>(side);
-      for (std::int64_t z = -1; z <= 1; ++z)
-        for (std::int64_t y = -1; y <= 1; ++y)
-          for (std::int64_t x = -1; x <= 1; ++x)
-            if (x != 0 || y != 0 || z != 0) all[k++] = (z * row + y) * row + x;
-      return all;
-    }();
-    return steps;
+  /// Steps to a cell's own and the 26 round it, in a cube of cells with rows of so many.
+  static std::array<std::int64_t, 27> neighbours(std::int64_t row) {
+    std::array<std::int64_t, 27> all{};
+    std::size_t k = 1;
+    for (std::int64_t z = -1; z <= 1; ++z)
+      for (std::int64_t y = -1; y <= 1; ++y)
+        for (std::int64_t x = -1; x <= 1; ++x)
+          if (x != 0 || y != 0 || z != 0) all[k++] = (z * row + y) * row + x;
+    return all;
   }
 
+  /// Along an edge of the cube round all directions, with one cell beyond them at each end.
+  std::size_t cells_to_axis_end_;
+  std::size_t side_;
+  std::array<std::int64_t, 27> neighbours_;
   std::vector<std::size_t> cells_;
   std::vector<std::uint32_t> order_;
   std::vector<std::uint32_t> begins_;
 };
 
+/// Marks those of these points that are isolated; returns how many.
+std::size_t mark(std::span<const Eigen::Vector3f> points, std::span<const float> angles_rad,
+                 const Directions& directions, std::span<const std::uint32_t> asked,
+                 std::vector<std::uint8_t>& isolated) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, asked.size(), 512), [&](const auto& range) {
+    for (std::size_t k = range.begin(); k < range.end(); ++k) {
+      const std::uint32_t i = asked[k];
+      const float range_m = points[i].norm();
+      if (range_m > reach_m) continue;
+      // No farther than the cells round its own go, which is less than the noise near the lidar.
+      const float beside_m = std::min(std::hypot(range_m * angles_rad[i], range_noise_m),
+                                      range_m * directions.angle_rad());
+      isolated[i] = directions.is_alone(points, i, beside_m) ? 1 : 0;
+    }
+  });
+  return static_cast<std::size_t>(
+      std::ranges::count_if(asked, [&](std::uint32_t i) { return isolated[i] != 0; }));
+}
+
 }  // namespace
 
-std::vector<bool> isolated_points(std::span<const Eigen::Vector3f> points_lidar,
-                                  const RayDensity& rays) {
-  const Directions directions(points_lidar);
-  std::vector<bool> isolated(points_lidar.size());
-  for (std::size_t i = 0; i < points_lidar.size(); ++i) {
-    const float range_m = points_lidar[i].norm();
-    if (range_m > reach_m) continue;
-    const float beside_m = range_m * angle_of(rays.per_steradian(points_lidar[i]));
-    isolated[i] = directions.is_alone(points_lidar, i, std::hypot(beside_m, range_noise_m));
+std::vector<std::uint8_t> isolated_points(std::span<const Eigen::Vector3f> points_lidar,
+                                          const RayDensity& rays, const std::vector<bool>& first,
+                                          double min_share) {
+  std::vector<float> angles_rad(points_lidar.size());
+  std::vector<std::uint32_t> asked_first, others;
+  for (std::uint32_t i = 0; i < points_lidar.size(); ++i) {
+    angles_rad[i] = angle_of(rays.per_steradian(points_lidar[i]));
+    (first[i] ? asked_first : others).push_back(i);
   }
+  if (asked_first.empty()) return {};
+  const Directions directions(points_lidar, *std::ranges::max_element(angles_rad));
+  std::vector<std::uint8_t> isolated(points_lidar.size());
+  const auto found =
+      static_cast<double>(mark(points_lidar, angles_rad, directions, asked_first, isolated));
+  if (found < min_share * static_cast<double>(asked_first.size())) return {};
+  mark(points_lidar, angles_rad, directions, others, isolated);
   return isolated;
 }
 

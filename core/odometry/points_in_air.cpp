@@ -171,16 +171,14 @@ class NearCubes {
   std::vector<std::uint8_t> is_thin_;
 };
 
-/// To the `count` points that were found, all that are isolated, unless these were thin plants.
-void add_isolated(std::span<const Eigen::Vector3f> points_lidar, RayDensity rays, std::size_t count,
+/// To the points that were found, all that are isolated, unless these were thin plants.
+void add_isolated(std::span<const Eigen::Vector3f> points_lidar, RayDensity rays,
                   std::vector<bool>& in_air) {
   rays.count_sky();
-  const std::vector<bool> isolated = isolated_points(points_lidar, rays);
-  std::size_t isolated_count = 0;
-  for (std::size_t i = 0; i < in_air.size(); ++i)
-    isolated_count += in_air[i] && isolated[i] ? 1 : 0;
-  if (static_cast<double>(isolated_count) < min_isolated_share * static_cast<double>(count)) return;
-  for (std::size_t i = 0; i < in_air.size(); ++i) in_air[i] = in_air[i] || isolated[i];
+  const std::vector<std::uint8_t> isolated =
+      isolated_points(points_lidar, rays, in_air, min_isolated_share);
+  for (std::size_t i = 0; i < isolated.size(); ++i)
+    if (isolated[i] != 0) in_air[i] = true;
 }
 
 }  // namespace
@@ -198,7 +196,7 @@ std::vector<bool> points_in_air(std::span<const Eigen::Vector3f> points_lidar) {
     ++count;
   }
   if (static_cast<double>(count) < few) return {};
-  add_isolated(points_lidar, rays, count, in_air);
+  add_isolated(points_lidar, rays, in_air);
   return in_air;
 }
 

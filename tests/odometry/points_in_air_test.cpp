@@ -176,16 +176,17 @@ TEST(PointsInAir, AreThoseOfThePlainRuleAndWhatIsIsolated) {
     ASSERT_EQ(in_air.size(), points.size());
     RayDensity rays(points);
     rays.count_sky();
-    const std::vector<bool> isolated = isolated_points(points, rays);
+    const std::vector<std::uint8_t> isolated =
+        isolated_points(points, rays, std::vector<bool>(points.size(), true), 0.0);
     double count = 0.0, isolated_count = 0.0;
     for (std::size_t i = 0; i < points.size(); ++i)
       if (rule.is_in_air(points[i])) {
         count += 1.0;
-        isolated_count += isolated[i] ? 1.0 : 0.0;
+        isolated_count += isolated[i] != 0 ? 1.0 : 0.0;
       }
     const bool are_drops = isolated_count >= 0.66 * count;
     for (std::size_t i = 0; i < points.size(); ++i)
-      EXPECT_EQ(in_air[i], rule.is_in_air(points[i]) || (are_drops && isolated[i]))
+      EXPECT_EQ(in_air[i], rule.is_in_air(points[i]) || (are_drops && isolated[i] != 0))
           << share << ": " << points[i].transpose();
   }
 }
