@@ -166,55 +166,103 @@ bool holds_beside_lidar(const LevelPlane& plane, std::span<const Eigen::Vector3f
          std::ranges::count_if(nearest, is_seen);
 }
 
-/// Points of one metre along a strip of ground.
-struct StripMetre {
-  double points = 0.0, across_m = 0.0, height_m = 0.0, squares_m2 = 0.0, products_m2 = 0.0;
-
-  void add(double p_across_m, double p_height_m) {
-    points += 1.0;
-    across_m += p_across_m;
-    height_m += p_height_m;
-    squares_m2 += p_across_m * p_across_m;
-    products_m2 += p_across_m * p_height_m;
-  }
+/// A point of a strip of ground, and the metre along the strip that it lies in.
+struct StripPoint {
+  std::size_t metre = 0;
+  double across_m = 0.0, height_m = 0.0;
 };
 
-/// Whether a strip of ground, along the plane's level line and its middle `middle_m` up the slope
-/// from the lidar's foot, rises across that line by a third of what the plane does or less. Each
-/// metre of the strip has a height of its own: kerbs and platforms across it say nothing.
-bool is_strip_level(const LevelPlane& plane, std::span<const Eigen::Vector3f> lowest,
-                    double middle_m) {
-  constexpr double half_width_m = 1.3, near_m = 0.5, level_share = 0.65;
-  constexpr std::size_t min_metres = 6;
-  const double slope = plane.slope.norm();
-  const Eigen::Vector2d up_slope = plane.slope / slope, along(-up_slope.y(), up_slope.x());
-  std::array<StripMetre, across> metres{};
+constexpr double half_strip_m = 1.3;
+
+/// What lies near the plane along its level line, in a strip whose middle is `middle_m` up the
+/// slope from the lidar's foot: how far up the slope from that middle, and how high above the
+/// plane.
+std::vector<StripPoint> strip_of(const LevelPlane& plane, std::span<const Eigen::Vector3f> lowest,
+                                 double middle_m) {
+  constexpr double near_m = 0.5;
+  const Eigen::Vector2d up_slope = plane.slope.normalized(), along(-up_slope.y(), up_slope.x());
+  std::vector<StripPoint> strip;
   for (const Eigen::Vector3f& p : lowest) {
     const Eigen::Vector2d at = p.head<2>().cast<double>();
     const double across_m = up_slope.dot(at) - middle_m, height_m = above(plane, p);
-    if (std::abs(across_m) > half_width_m || std::abs(height_m) > near_m) continue;
+    if (std::abs(across_m) > half_strip_m || std::abs(height_m) > near_m) continue;
     const double along_m = std::clamp(along.dot(at) + reach_m, 0.0, across - 0.5);
-    metres[static_cast<std::size_t>(along_m)].add(across_m, height_m);
+    strip.push_back({static_cast<std::size_t>(along_m), across_m, height_m});
   }
-  std::size_t seen = 0;
-  double squares_m2 = 0.0, products_m2 = 0.0;
-  for (const StripMetre& m : metres) {
-    if (m.points < 2.0) continue;
-    ++seen;
-    squares_m2 += m.squares_m2 - m.across_m * m.across_m / m.points;
-    products_m2 += m.products_m2 - m.across_m * m.height_m / m.points;
+  return strip;
+}
+
+/// Regression of the heights in a strip on something across it.
+struct Regression {
+  std::size_t metres = 0;
+  /// Sums of squared deviations of that, and of their products with those of the heights.
+  double squares = 0.0, products = 0.0;
+
+  /// The part of the squared heights that it accounts for [m²].
+  [[nodiscard]] double explained_m2() const { return products * products / squares; }
+};
+
+/// On `predictor(across_m)`. Each metre of the strip has a height of its own: kerbs and platforms
+/// across it say nothing.
+template <typename Predictor>
+Regression regression_on(Predictor predictor, std::span<const StripPoint> strip) {
+  struct Sums {
+    double points = 0.0, x = 0.0, height = 0.0, squares = 0.0, products = 0.0;
+  };
+  std::array<Sums, across> metres{};
+  for (const StripPoint& p : strip) {
+    const double x = predictor(p.across_m);
+    Sums& sums = metres[p.metre];
+    sums.points += 1.0;
+    sums.x += x;
+    sums.height += p.height_m;
+    sums.squares += x * x;
+    sums.products += x * p.height_m;
   }
-  return seen >= min_metres && products_m2 < -level_share * slope * squares_m2;
+  Regression regression;
+  for (const Sums& sums : metres) {
+    if (sums.points < 2.0) continue;
+    ++regression.metres;
+    regression.squares += sums.squares - sums.x * sums.x / sums.points;
+    regression.products += sums.products - sums.x * sums.height / sums.points;
+  }
+  return regression;
+}
+
+/// Whether a step along the strip, as a kerb or the edge of a pavement, tells its heights better
+/// than the slope across it does.
+bool is_step(std::span<const StripPoint> strip, const Regression& slope) {
+  constexpr int steps = 13;
+  constexpr double first_m = -0.9, apart_m = 0.15;
+  // Two metres with a point on either side.
+  constexpr double min_squares = 1.0;
+  for (int i = 0; i < steps; ++i) {
+    const double step_m = first_m + i * apart_m;
+    const Regression step =
+        regression_on([&](double across_m) { return across_m > step_m ? 1.0 : 0.0; }, strip);
+    if (step.squares > min_squares && step.explained_m2() > slope.explained_m2()) return true;
+  }
+  return false;
+}
+
+/// Whether such a strip rises across its middle by a third of what the plane does or less, and not
+/// because of a step: beside a kerb either side of it may lean as the plane does.
+bool is_strip_level(const LevelPlane& plane, std::span<const Eigen::Vector3f> lowest,
+                    double middle_m) {
+  constexpr double level_share = 0.65;
+  constexpr std::size_t min_metres = 6;
+  const std::vector<StripPoint> strip = strip_of(plane, lowest, middle_m);
+  const Regression rise = regression_on([](double across_m) { return across_m; }, strip);
+  return rise.metres >= min_metres &&
+         rise.products < -level_share * plane.slope.norm() * rise.squares && !is_step(strip, rise);
 }
 
 /// Whether the lidar is on a level lane in a slope: however much of what is around lies on the
 /// plane of that, the lane, which goes along the slope's level line, does not rise across that
 /// line. The lidar may be nearer to one edge of it than to the other. Where no ground is seen there
-/// nothing speaks for a lane.
+/// nothing speaks for a lane. Strips of roads differ by as much as a slope that is no lean.
 bool is_on_lane_in_slope(const LevelPlane& plane, std::span<const Eigen::Vector3f> lowest) {
-  // Less hardly counts as a lean (3 degrees), and strips of roads differ by as much.
-  constexpr double least_slope = 0.05;
-  if (plane.slope.norm() < least_slope) return false;
+  if (std::atan(plane.slope.norm()) < least_seen_tilt_rad) return false;
   return std::ranges::any_of(std::array{-1.0, 0.0, 1.0}, [&](double middle_m) {
     return is_strip_level(plane, lowest, middle_m);
   });

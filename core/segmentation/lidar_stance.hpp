@@ -16,6 +16,10 @@ struct LidarStance {
   double height_m = 0.0;
 };
 
+/// A lean that nobody told and the ground shows counts from here on. Less costs little, and lidars
+/// that count as upright lean by 2 degrees against the road, by 3 where it begins to rise.
+inline constexpr double least_seen_tilt_rad = 0.07;
+
 /// Whether these points lie at fewer elevations than those, the same ones along other axes: whether
 /// the beams that measured them have rows along these axes rather than along those.
 [[nodiscard]] bool has_fewer_elevations(std::span<const Eigen::Vector3f> these,

@@ -77,10 +77,6 @@ std::optional<std::pair<double, double>> field_of_view(std::span<const Eigen::Ve
   return field.second - field.first > least_rad ? std::optional(field) : std::nullopt;
 }
 
-/// A lean that nobody told and the ground shows. Less costs little, and lidars that count as
-/// upright lean by 2 degrees against the road, by 3 where it begins to rise.
-constexpr double least_seen_tilt_rad = 0.07;
-
 /// What brings z to heights that the model has seen, of a lidar that the ground shows so much
 /// higher than that [m]: nothing of what such lidars differ by among themselves, all of what only
 /// another vehicle explains, and a part of it between, since a height lies now on this side of any

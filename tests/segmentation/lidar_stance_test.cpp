@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "core/segmentation/network_segmenter.hpp"
@@ -93,21 +94,29 @@ struct Beams {
   double step_deg = 0.425;
 };
 
-/// Of ground whose height at y is `height_at_m(y)`, for an upright lidar 1.73 m over that at 0, as
-/// these beams see it within 60 m.
+/// A lidar over a road, and how it leans.
+struct OverRoad {
+  double height_m = 1.73;
+  Eigen::Matrix3d R_world_lidar = Eigen::Matrix3d::Identity();
+};
+
+/// Of ground whose height at y is `height_at_m(y)`, for a lidar over that at 0, as these beams see
+/// it within 60 m.
 template <typename HeightAt>
-std::vector<Eigen::Vector3f> scan_along_road(HeightAt height_at_m, const Beams& beams = {}) {
+std::vector<Eigen::Vector3f> scan_along_road(HeightAt height_at_m, const Beams& beams = {},
+                                             const OverRoad& lidar = {}) {
   constexpr double reach_m = 60.0, step_m = 0.05;
-  const double lidar_m = 1.73 + height_at_m(0.0);
+  const double lidar_m = lidar.height_m + height_at_m(0.0);
   std::vector<Eigen::Vector3f> points;
   for (int beam = 0; beam < beams.count; ++beam) {
     const double slope = std::tan((beams.highest_deg - beams.step_deg * beam) * rad_per_deg);
     for (int column = 0; column < 360; ++column) {
       const double azimuth = (column + 0.3) * rad_per_deg;
+      const Eigen::Vector3d beam_lidar(std::cos(azimuth), std::sin(azimuth), slope);
+      const Eigen::Vector3d beam_world = lidar.R_world_lidar * beam_lidar;
       for (double r = 1.0; r < reach_m; r += step_m) {
-        const double y = r * std::sin(azimuth), z = r * slope;
-        if (lidar_m + z > height_at_m(y)) continue;
-        points.push_back(Eigen::Vector3d(r * std::cos(azimuth), y, z).cast<float>());
+        if (lidar_m + r * beam_world.z() > height_at_m(r * beam_world.y())) continue;
+        points.push_back((r * beam_lidar).cast<float>());
         break;
       }
     }
@@ -136,9 +145,14 @@ struct LaneInSlope {
   /// From the middle of the lane to the lidar.
   double off_m = 0.0;
 
+  [[nodiscard]] std::optional<LidarStance> found(const Beams& beams,
+                                                 const OverRoad& lidar = {}) const {
+    return stance_over_ground(
+        scan_along_road([&](double y) { return height_m(y + off_m); }, beams, lidar));
+  }
+
   [[nodiscard]] double found_tilt_deg(const Beams& beams) const {
-    const auto stance =
-        stance_over_ground(scan_along_road([&](double y) { return height_m(y + off_m); }, beams));
+    const auto stance = found(beams);
     return stance ? stance->tilt_rad / rad_per_deg : 0.0;
   }
 
@@ -150,14 +164,15 @@ struct LaneInSlope {
   }
 };
 
+constexpr Beams hdl_64e, vlp_16{.count = 16, .highest_deg = 15.0, .step_deg = 2.0};
+
 TEST(LidarStance, IsNotThatAgainstTheSlopeThatALevelLaneIsIn) {
-  const Beams hdl_64e, vlp_16{.count = 16, .highest_deg = 15.0, .step_deg = 2.0};
   std::vector<LaneInSlope> lanes;
   for (const double half_width_m : {2.0, 3.0}) {
     for (const double slope_deg : {8.0, 10.0}) {
       for (const bool is_cut : {false, true}) {
-        lanes.push_back({half_width_m, slope_deg, is_cut, 0.0});
-        lanes.push_back({half_width_m, slope_deg, is_cut, 1.0});
+        for (const double off_m : {-1.0, 0.0, 1.0})
+          lanes.push_back({half_width_m, slope_deg, is_cut, off_m});
       }
     }
   }
@@ -166,6 +181,37 @@ TEST(LidarStance, IsNotThatAgainstTheSlopeThatALevelLaneIsIn) {
         << lane.half_width_m << ' ' << lane.slope_deg << ' ' << lane.is_cut << ' ' << lane.off_m;
     EXPECT_LT(lane.found_tilt_deg(vlp_16), 3.0)
         << lane.half_width_m << ' ' << lane.slope_deg << ' ' << lane.is_cut << ' ' << lane.off_m;
+  }
+}
+
+TEST(LidarStance, HasItsHeightInALaneInASlopeTooSlightForALean) {
+  const LaneInSlope lane{.slope_deg = 3.5, .is_cut = true};
+  for (const Beams& beams : {hdl_64e, vlp_16}) {
+    const auto stance = lane.found(beams, {.height_m = 2.3});
+    ASSERT_TRUE(stance) << beams.count;
+    EXPECT_NEAR(stance->height_m, 2.3, 0.15) << beams.count;
+    EXPECT_LT(stance->tilt_rad, least_seen_tilt_rad) << beams.count;
+  }
+}
+
+TEST(LidarStance, IsReadOffTheGroundBesideAKerb) {
+  struct Step {
+    double at_m = 0.0, rise_m = 0.0;
+  };
+  // Kerbs beside a road, and a road beside a pavement that the lidar is on.
+  constexpr double kerb_m = 0.12, road_m = -0.15;
+  for (const Step& step : std::vector<Step>{
+           {0.5, kerb_m}, {1.0, kerb_m}, {0.5, road_m}, {1.0, road_m}, {1.5, road_m}}) {
+    for (const double roll_deg : {-6.0, 6.0}) {
+      for (const Beams& beams : {hdl_64e, vlp_16}) {
+        const auto stance = stance_over_ground(
+            scan_along_road([&](double y) { return y > step.at_m ? step.rise_m : 0.0; }, beams,
+                            {.R_world_lidar = leaning(roll_deg, 0.0)}));
+        ASSERT_TRUE(stance) << step.at_m << ' ' << step.rise_m << ' ' << roll_deg << ' '
+                            << beams.count;
+        EXPECT_NEAR(stance->tilt_rad, 6.0 * rad_per_deg, 1.0 * rad_per_deg);
+      }
+    }
   }
 }
 
