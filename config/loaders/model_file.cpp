@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "config/loaders/int8_file.hpp"
@@ -10,6 +11,7 @@
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/network_segmenter.hpp"
 #include "core/segmentation/segmenter.hpp"
+#include "idl/dds/shown_text.hpp"
 
 namespace stillmap {
 namespace {
@@ -133,18 +135,25 @@ std::optional<TrainedSensors> read_trained_for(YamlSection section) {
   return seen;
 }
 
-/// It stands in lines of logs, of the status and of terminals.
-void read_name(YamlSection& file, std::string& name) {
-  file.text("name", name);
-  const auto is_shown = [](unsigned char c) { return c >= 0x20 && c != 0x7F; };
-  if (file.has("name") && (name.empty() || !std::ranges::all_of(name, is_shown)))
-    file.fault("name", "must be one line of characters that can be shown");
+/// What stands in lines of logs, of the status and of terminals. Blanks and line ends around it, as
+/// a folded text of YAML has one, are no part of it.
+void read_line(YamlSection& file, const std::string& field, std::string& line) {
+  std::string text;
+  if (!file.text(field, text)) return;
+  constexpr std::string_view blanks = " \t\r\n";
+  const std::size_t first = std::min(text.find_first_not_of(blanks), text.size());
+  line = text.substr(first, text.find_last_not_of(blanks) + 1 - first);
+  if (line.empty()) {
+    file.fault(field, "must not be empty");
+  } else if (dds::shown_text(line, line.size()) != line) {
+    file.fault(field, "must be one line of characters that can be shown");
+  }
 }
 
 void read_model(YamlSection file, ModelDescription& model) {
   file.require({"name", "licence", "image", "statistics", "classes"});
-  read_name(file, model.name);
-  file.text("licence", model.licence);
+  read_line(file, "name", model.name);
+  read_line(file, "licence", model.licence);
   file.text("sensor", model.sensor);
   file.text("training", model.training);
   file.text("accuracy", model.accuracy);

@@ -243,17 +243,19 @@ void YamlSection::boolean(const std::string& name, bool& value) {
   if (index) assign(name, value, *index == 1);
 }
 
-void YamlSection::text(const std::string& name, std::string& value) {
+bool YamlSection::text(const std::string& name, std::string& value) {
   const std::optional<YAML::Node> node = field(name);
-  if (!node) return;
+  if (!node) return false;
   const bool has_text = node->IsScalar() || node->IsNull();
   if (has_text && has_null_character(*node)) {
     fault(name, "has a character \\0, at which names of files and topics would end");
   } else if (has_text) {
     assign(name, value, node->IsNull() ? std::string() : node->Scalar());
+    return true;
   } else {
     fault(name, shown(*node) + " is not allowed; a text");
   }
+  return false;
 }
 
 void YamlSection::text_list(const std::string& name, std::vector<std::string>& values) {

@@ -65,7 +65,8 @@ class YamlSection {
   void degrees_list(const std::string& name, std::vector<double>& radians, Range allowed_deg);
   /// true or false.
   void boolean(const std::string& name, bool& value);
-  void text(const std::string& name, std::string& value);
+  /// False where there is none, or no text.
+  bool text(const std::string& name, std::string& value);
   void text_list(const std::string& name, std::vector<std::string>& values);
   /// A relative path starts at the file's folder; nothing written is the empty path.
   void path(const std::string& name, std::filesystem::path& value);

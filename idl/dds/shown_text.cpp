@@ -1,6 +1,7 @@
 #include "idl/dds/shown_text.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 namespace stillmap::dds {
 namespace {
@@ -24,6 +25,13 @@ std::size_t utf8_bytes(std::string_view text) {
   return follows(2) && follows(3) ? 4 : 0;
 }
 
+/// Of Unicode's Bidi_Control: they turn the order in which what follows is shown.
+bool is_turn(std::string_view character) {
+  constexpr std::string_view turns[] = {"\u061C", "\u200E", "\u200F", "\u202A", "\u202B", "\u202C",
+                                        "\u202D", "\u202E", "\u2066", "\u2067", "\u2068", "\u2069"};
+  return std::ranges::find(turns, character) != std::end(turns);
+}
+
 /// U+0000 to U+001F, U+007F to U+009F, and those that end a line or a paragraph.
 bool is_control(std::string_view character) {
   const auto first = static_cast<unsigned char>(character.front());
@@ -40,7 +48,7 @@ std::string shown_text(std::string_view text, std::size_t max_bytes) {
   while (!text.empty()) {
     const std::size_t bytes = utf8_bytes(text);
     const std::string_view character = text.substr(0, bytes);
-    const bool is_shown = bytes > 0 && !is_control(character);
+    const bool is_shown = bytes > 0 && !is_control(character) && !is_turn(character);
     const std::string_view next = is_shown ? character : std::string_view("?");
     if (shown.size() + next.size() > max_bytes) return shown.append("...");
     shown.append(next);

@@ -7,7 +7,8 @@
 namespace stillmap::dds {
 
 /// Text that somebody else sent, for terminals, logs and messages: `max_bytes` of it at most, then
-/// "...". Control characters, and bytes that are no UTF-8, become '?'.
+/// "...". Control characters, those that turn the direction of text, and bytes that are no UTF-8,
+/// become '?'.
 [[nodiscard]] std::string shown_text(std::string_view text, std::size_t max_bytes);
 
 }  // namespace stillmap::dds

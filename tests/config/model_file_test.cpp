@@ -17,6 +17,7 @@ using test::refusal;
 using test::write_file;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 const std::string sound = R"(
 name: tiny
@@ -39,10 +40,13 @@ ModelDescription load_model(const std::string& yaml) {
   return load_model_description(write_file("model.yaml", yaml).parent_path());
 }
 
-std::string refusal_of(std::string yaml, const std::string& from, const std::string& to) {
+std::string changed(std::string yaml, const std::string& from, const std::string& to) {
   EXPECT_NE(yaml.find(from), std::string::npos);
-  yaml.replace(yaml.find(from), from.size(), to);
-  return refusal([&] { (void)load_model(yaml); });
+  return yaml.replace(yaml.find(from), from.size(), to);
+}
+
+std::string refusal_of(const std::string& yaml, const std::string& from, const std::string& to) {
+  return refusal([&] { (void)load_model(changed(yaml, from, to)); });
 }
 
 TEST(ModelFile, ReadsADescriptionThatCanBeUsed) {
@@ -203,10 +207,26 @@ TEST(ModelFile, NamesWhatIsMissingOrWrong) {
   EXPECT_THAT(refusal_of(sound, "rows: 64", "rows: -64"), HasSubstr("image.rows: '-64'"));
   EXPECT_THAT(refusal_of(sound, "fov_up_deg: 3", "fov_up_deg: -30"), HasSubstr("below"));
   EXPECT_THAT(refusal_of(sound, "neighbours: 7", "window: 4"), HasSubstr("odd"));
-  for (const char* const name : {R"("")", R"("tiny\n2026 all is well")", R"("\e[31mred")"})
-    EXPECT_THAT(refusal_of(sound, "name: tiny", std::string("name: ") + name),
-                HasSubstr("one line"))
-        << name;
+}
+
+TEST(ModelFile, NameAndLicenceAreLinesThatCanBeShown) {
+  for (const std::string field : {"name", "licence"}) {
+    const std::string given = field + (field == "name" ? ": tiny" : ": MIT");
+    const auto refusal_with = [&](const std::string& text) {
+      return refusal_of(sound, given, field + ": " + text);
+    };
+    // Line ends, escapes and the 8-bit kind of them, text that runs backwards, and Latin-1.
+    for (const char* const text :
+         {R"("tiny\n2026 all is well")", R"("\e[31mred")", R"("\x9B31mred")", R"("a\Lb")",
+          R"("tiny\N2026 all is well")", R"("a\u202Eb")", "mod\xE8le"})
+      EXPECT_THAT(refusal_with(text), HasSubstr(field + ": must be one line")) << text;
+    for (const char* const text : {R"("")", R"("  \n")", "", "~"})
+      EXPECT_THAT(refusal_with(text), HasSubstr(field + ": must not be empty")) << text;
+    EXPECT_THAT(refusal_with("[a]"), AllOf(HasSubstr(field), Not(HasSubstr("must"))));
+  }
+  EXPECT_EQ(load_model(changed(sound, "name: tiny", "name: >\n  a model of\n  ours\n")).name,
+            "a model of ours");
+  EXPECT_EQ(load_model(changed(sound, "name: tiny", "name: modèle 雪")).name, "modèle 雪");
 }
 
 TEST(ModelFile, RefusesAFolderThatIsNotThere) {

@@ -25,6 +25,7 @@ TEST(ShownName, ReplacesControlCharacters) {
   EXPECT_EQ(shown_name(std::string("a\0b", 3)), "a?b");
   // A next line and a line separator.
   EXPECT_EQ(shown_name("a\xC2\x85_\xE2\x80\xA8z"), "a?_?z");
+  EXPECT_EQ(shown_name("a\u202Eb\u2066\u200F"), "a?b??");
 }
 
 TEST(ShownName, ReplacesBytesThatAreNoUtf8) {
