@@ -364,6 +364,36 @@ TEST_F(DatasetCommandTest, ExportsTheSamplesOfImuAndGnss) {
   EXPECT_GT(line_count("part/imu.csv"), 200U);
 }
 
+TEST_F(DatasetCommandTest, ExportLabelsScansOfALidarThatSitsAsTheServersFileSays) {
+  ASSERT_EQ(run("simulate " + path("leaning") + " --sensor vlp_16 --scans 1 --mount 0,0,1.7,0,15,0")
+                .exit_code,
+            0);
+  std::filesystem::copy(folder_ / "leaning", folder_ / "bare",
+                        std::filesystem::copy_options::recursive);
+  remove("bare/labels");
+  const std::string base = "frames: {base: base_link}\nlabels: {stance: mount}\n";
+  write("leaning.yaml", base + "mount: {xyz_m: [0, 0, 1.7], rpy_deg: [0, 15, 0]}\n");
+  write("upright.yaml", base);
+  write("elsewhere.yaml", base + "mount: {source: tf_static}\n");
+  std::string said;
+  const auto accuracy = [&](const std::string& config) {
+    const ProcessResult exported =
+        run("dataset export " + path("bare") + " " + path("copy") +
+            " --force --labels model --columns 512 --sensor vlp_16 --config " + path(config));
+    EXPECT_EQ(exported.exit_code, 0) << exported.err;
+    said = exported.err;
+    return run_json("evaluate segmentation --truth " + path("leaning") + " --predictions " +
+                    path("copy/labels"))
+        .at("accuracy")
+        .get<double>();
+  };
+  const double upright = accuracy("upright.yaml");
+  EXPECT_THAT(said, Not(HasSubstr("/tf_static")));
+  EXPECT_GT(accuracy("leaning.yaml"), upright + 0.1);
+  EXPECT_EQ(accuracy("elsewhere.yaml"), upright);
+  EXPECT_THAT(said, HasSubstr("/tf_static"));
+}
+
 TEST_F(DatasetCommandTest, ExportLeavesNoPartOfAnotherSequence) {
   simulate("city", 2);
   const std::string to_copy =

@@ -145,6 +145,12 @@ TEST_F(EvaluateCommandTest, BelievesTheMountAloneWhereAskedTo) {
   EXPECT_GT(accuracy(""), untold + 0.1);
   EXPECT_GT(accuracy(" --stance mount" + mount), untold + 0.1);
   EXPECT_EQ(run(command + " --stance upright").exit_code, 2);
+  for (const std::string stance : {"mount", "auto"}) {
+    const ProcessResult both =
+        run(command + " --predictions " + path("leaning/labels") + " --stance " + stance);
+    EXPECT_EQ(both.exit_code, 2);
+    EXPECT_THAT(both.err, HasSubstr("--stance"));
+  }
 }
 
 TEST_F(EvaluateCommandTest, TellsTheNetworkHowTheLidarLeans) {

@@ -1,3 +1,4 @@
+#include <Eigen/Geometry>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -82,6 +83,23 @@ void require_one_lidar(const std::string& config_file) {
                               "file with 'sensor', or name the lidar with --sensor");
 }
 
+/// Where the lidar sits on its robot, as the server's file says. It decides nothing but how a model
+/// is shown the scans: what a sequence does not tell, /tf_static and which one of several lidars it
+/// is of, is no fault.
+std::optional<Eigen::Isometry3d> told_mount(const std::string& config_file) {
+  const ServerConfig server =
+      config_file.empty() ? ServerConfig{} : load_server_config(config_file);
+  if (!server.lidars.empty() || server.mount.source == MountConfig::Source::tf_static)
+    return std::nullopt;
+  return server.mount.T_base_lidar;
+}
+
+std::string describe_untold_mount(const std::string& config_file) {
+  return "stillmap: " + config_file +
+         " does not say where this lidar sits ('mount' leaves it to /tf_static, or 'sensors' lists "
+         "several): it is labelled as one without a mount\n";
+}
+
 ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopSignal& stop) {
   if (!arguments.mapper.names_sensor()) require_one_lidar(arguments.mapper.config_file);
   const ScanDataset dataset = open_recording(arguments.source, arguments.recording,
@@ -95,9 +113,14 @@ ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopS
   }
   const std::size_t total = arguments.range.end(dataset) - arguments.range.first;
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
-  auto labels = make_segmenter(arguments.mapper, dataset);
+  const std::optional<Eigen::Isometry3d> mount = told_mount(arguments.mapper.config_file);
+  auto labels =
+      make_segmenter(arguments.mapper, dataset, mount.value_or(Eigen::Isometry3d::Identity()));
   std::cerr << describe_sensor_mismatch(dataset, config.sensor)
-            << describe_model(arguments.mapper, dataset, *labels);
+            << describe_model(arguments.mapper, dataset, *labels)
+            << (mount || labels->details().empty()
+                    ? std::string()
+                    : describe_untold_mount(arguments.mapper.config_file));
   // What cannot be read is told before anything is replaced.
   static_cast<void>(dataset.imu());
   static_cast<void>(dataset.gnss());
@@ -196,7 +219,8 @@ void add_dataset_export_command(CommandHandle dataset, Action& action) {
       "  stillmap dataset export topic:points campus --config server.yaml --scans 600\n"
       "Writes velodyne/*.bin (every scan and point in the order of the source; intensity 0..1),\n"
       "labels/*.label (the source's own, else the first guess of --labels, of the running\n"
-      "server, or 0; --labels takes the lidar to be upright), times.txt, calib.txt, and poses.txt\n"
+      "server, or 0; for --labels the lidar stands as the mount in the file of --config says, see\n"
+      "--stance), times.txt, calib.txt, and poses.txt\n"
       "from our odometry: camera frame of scan k into camera frame of scan 0, where calib.txt's\n"
       "Tr takes lidar to camera (a camera that looks forward from the lidar's place). Point times "
       "and rings go to time_offsets/ and "

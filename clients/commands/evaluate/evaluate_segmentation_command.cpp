@@ -4,6 +4,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/arguments/mount_arguments.hpp"
@@ -163,10 +164,19 @@ SequenceScore run_model(const EvaluateSegmentationArguments& arguments, std::siz
   return {sequence, result.score};
 }
 
+/// Files were predicted as whoever made them took the lidar to stand.
+void refuse_stance(const EvaluateSegmentationArguments& arguments) {
+  for (const auto& [option, is_given] : {std::pair("--mount", !arguments.mount.xyz_rpy.empty()),
+                                         std::pair("--stance", !arguments.mapper.stance.empty())}) {
+    if (is_given)
+      throw std::invalid_argument(std::string(option) +
+                                  " is for a model that runs, not for --predictions");
+  }
+}
+
 ExitCode run(const EvaluateSegmentationArguments& arguments) {
   std::vector<SequenceScore> sequences;
-  if (!arguments.predictions.empty() && !arguments.mount.xyz_rpy.empty())
-    throw std::invalid_argument("--mount is for a model that runs, not for --predictions");
+  if (!arguments.predictions.empty()) refuse_stance(arguments);
   if (arguments.predictions.empty()) {
     for (std::size_t number = 0; number < arguments.truth.size(); ++number) {
       sequences.push_back(run_model(arguments, number));
