@@ -44,15 +44,18 @@ RingSpacing spacing_of(std::span<const Eigen::Vector3f> ring) {
   constexpr float max_angles_rad = 0.055F;
   /// A surface at 30 degrees to the beam: its steps are so many times those of one that faces it.
   constexpr float grazing_steps = 2.0F;
-  /// Up to half a degree all that is as LOAM has it.
+  /// Up to half a degree all that is as LOAM has it, and the window up to where each point was one
+  /// on a grazed surface: between both, first motions in rolling traffic have too few edges of it.
   constexpr float fine_step_rad = 0.009F;
+  constexpr float fine_window_step_rad = 0.0135F;
   const float step_rad = ray_step_rad(ring);
   const auto angles_rad = [&](std::size_t neighbours) {
     return 0.5F * static_cast<float>(neighbours * (neighbours + 1)) * step_rad;
   };
   RingSpacing spacing;
   if (step_rad <= fine_step_rad) return spacing;
-  while (spacing.half_window > 1 && angles_rad(spacing.half_window) > max_angles_rad)
+  while (step_rad > fine_window_step_rad && spacing.half_window > 1 &&
+         angles_rad(spacing.half_window) > max_angles_rad)
     --spacing.half_window;
   const float grazing_share = grazing_steps * step_rad;
   spacing.grazing_share2 = std::max(spacing.grazing_share2, grazing_share * grazing_share);

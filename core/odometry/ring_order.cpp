@@ -22,7 +22,8 @@ float ray_step_rad(std::span<const Eigen::Vector3f> ring_lidar) {
   constexpr float same_ray_rad = 1e-4F;
   // So many tell.
   constexpr std::size_t enough = 200;
-  const std::size_t stride = std::max<std::size_t>(1, ring_lidar.size() / enough);
+  // Odd: of two returns a ray, every second pair would be of one ray.
+  const std::size_t stride = std::max<std::size_t>(1, ring_lidar.size() / enough) | 1U;
   std::vector<float> steps_rad;
   steps_rad.reserve(ring_lidar.size() / stride + 1);
   for (std::size_t i = 1; i < ring_lidar.size(); i += stride) {
@@ -32,9 +33,10 @@ float ray_step_rad(std::span<const Eigen::Vector3f> ring_lidar) {
     if (sine > same_ray_rad) steps_rad.push_back(sine);
   }
   if (steps_rad.empty()) return 0.0F;
-  const auto middle = steps_rad.begin() + static_cast<std::ptrdiff_t>(steps_rad.size() / 2);
-  std::ranges::nth_element(steps_rad, middle);
-  return *middle;
+  // Where most rays do not return, most steps are gaps.
+  const auto low = steps_rad.begin() + static_cast<std::ptrdiff_t>(steps_rad.size() / 10);
+  std::ranges::nth_element(steps_rad, low);
+  return *low;
 }
 
 }  // namespace stillmap

@@ -30,8 +30,8 @@ class RingOrder {
   std::vector<std::uint32_t> begin_;
 };
 
-/// Angle between neighbouring rays of a ring, whose points are in firing order [rad]: that of most,
-/// since some do not return, or return twice. 0 of fewer than two points.
+/// Angle between neighbouring rays of a ring, whose points are in firing order [rad]: a tenth
+/// of them are nearer, since some do not return, or return twice. 0 of fewer than two points.
 [[nodiscard]] float ray_step_rad(std::span<const Eigen::Vector3f> ring_lidar);
 
 }  // namespace stillmap
