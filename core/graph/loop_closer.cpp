@@ -320,8 +320,9 @@ std::vector<std::size_t> LoopCloser::enough_agreeing(const Candidate& candidate)
   double extent_m = 0.0;
   for (std::size_t k = pending_.size(); k-- > 0;) {
     const auto agrees = [&](std::size_t later) { return agree(pending_[later], pending_[k]); };
-    // One that shows something above waits for more of the way, with whom it may agree.
-    if (!needs_extent && leads_to_other_level(pending_[k])) continue;
+    // One that shows something above waits for more of the way: what is high and open itself is
+    // no witness of it.
+    if (candidate.is_open_above && leads_to_other_level(pending_[k])) continue;
     if (pending_[k].to == candidate.to ||
         !(agree(candidate, pending_[k]) || (needs_extent && std::ranges::any_of(agreeing, agrees))))
       continue;
