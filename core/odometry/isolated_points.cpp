@@ -4,7 +4,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -29,15 +28,15 @@ float angle_of(float per_steradian) {
   return std::clamp(angle_rad, min_angle_rad, max_angle_rad);
 }
 
-/// Points by their direction: those of one cell, and the 26 round it, are all that are within an
-/// angle of a direction in it.
+/// Points by their direction: those of one cell, and of the shells of cells round it, are all that
+/// are within an angle of a direction in it.
 class Directions {
  public:
   Directions(std::span<const Eigen::Vector3f> points, float angle_rad)
       : cells_to_axis_end_(
             std::clamp(static_cast<std::size_t>(1.0F / angle_rad), min_cells, max_cells)),
-        side_(2 * cells_to_axis_end_ + 3),
-        neighbours_(neighbours(static_cast<std::int64_t>(side_))),
+        side_(2 * (cells_to_axis_end_ + max_shells) + 1),
+        shells_(shells(static_cast<std::int64_t>(side_))),
         cells_(points.size()),
         order_(points.size()),
         begins_(side_ * side_ * side_ + 1) {
@@ -51,17 +50,18 @@ class Directions {
       order_[next[cells_[i]]++] = static_cast<std::uint32_t>(i);
   }
 
-  /// Of a cell, from the origin [rad].
-  [[nodiscard]] float angle_rad() const { return 1.0F / static_cast<float>(cells_to_axis_end_); }
-
-  /// Whether fewer than `enough_near` other points are within `distance_m` of the i-th.
+  /// Whether fewer than `enough_near` other points are within an angle of the i-th, of at most
+  /// `max_angle_rad`, and no more than that in range from it.
   [[nodiscard]] bool is_alone(std::span<const Eigen::Vector3f> points, std::size_t i,
-                              float distance_m) const {
+                              float angle_rad) const {
     int near = 0;
-    const float squared_m2 = distance_m * distance_m;
+    const float squared_m2 = angle_rad * angle_rad * points[i].squaredNorm();
     const auto middle = static_cast<std::int64_t>(cells_[i]);
+    const auto reach =
+        static_cast<std::size_t>(std::ceil(angle_rad * static_cast<float>(cells_to_axis_end_)));
+    const std::size_t across = 2 * std::min(reach, max_shells) + 1;
     // The own cell first: most points are on something, and have enough of it there.
-    for (const std::int64_t step : neighbours_) {
+    for (const std::int64_t step : std::span(shells_).first(across * across * across)) {
       const auto cell = static_cast<std::size_t>(middle + step);
       for (std::uint32_t k = begins_[cell]; k < begins_[cell + 1]; ++k) {
         const std::uint32_t other = order_[k];
@@ -76,35 +76,48 @@ class Directions {
   static constexpr std::size_t min_cells = 16;
   /// More of them take longer to clear than the points in them to look at.
   static constexpr std::size_t max_cells = 40;
-  static_assert(1.0F / min_cells >= max_angle_rad);
+  static constexpr std::size_t max_shells = 3;
+  static_assert(max_angle_rad * max_cells <= max_shells);
 
   [[nodiscard]] std::size_t cell_of(const Eigen::Vector3f& point) const {
     const Eigen::Vector3f direction = point / std::max(point.norm(), 1e-3F);
     const auto along = [this](float part) {
       const float cells = (part + 1.0F) * static_cast<float>(cells_to_axis_end_);
-      return 1 + std::min(static_cast<std::size_t>(std::max(cells, 0.0F)), side_ - 3);
+      return max_shells +
+             std::min(static_cast<std::size_t>(std::max(cells, 0.0F)), 2 * cells_to_axis_end_);
     };
     return (along(direction.z()) * side_ + along(direction.y())) * side_ + along(direction.x());
   }
-  /// Steps to a cell's own and the 26 round it, in a cube of cells with rows of so many.
-  static std::array<std::int64_t, 27> neighbours(std::int64_t row) {
-    std::array<std::int64_t, 27> all{};
-    std::size_t k = 1;
-    for (std::int64_t z = -1; z <= 1; ++z)
-      for (std::int64_t y = -1; y <= 1; ++y)
-        for (std::int64_t x = -1; x <= 1; ++x)
-          if (x != 0 || y != 0 || z != 0) all[k++] = (z * row + y) * row + x;
-    return all;
+  /// Steps from a cell to itself, and to those of the shells round it, in a cube with rows of so
+  /// many.
+  static std::vector<std::int64_t> shells(std::int64_t row) {
+    std::vector<std::int64_t> steps;
+    const auto last = static_cast<std::int64_t>(max_shells);
+    for (std::int64_t shell = 0; shell <= last; ++shell)
+      for (std::int64_t z = -shell; z <= shell; ++z)
+        for (std::int64_t y = -shell; y <= shell; ++y)
+          for (std::int64_t x = -shell; x <= shell; ++x)
+            if (std::max({std::abs(x), std::abs(y), std::abs(z)}) == shell)
+              steps.push_back((z * row + y) * row + x);
+    return steps;
   }
 
-  /// Along an edge of the cube round all directions, with one cell beyond them at each end.
+  /// Along an edge of the cube round all directions, with shells beyond them at each end.
   std::size_t cells_to_axis_end_;
   std::size_t side_;
-  std::array<std::int64_t, 27> neighbours_;
+  std::vector<std::int64_t> shells_;
   std::vector<std::size_t> cells_;
   std::vector<std::uint32_t> order_;
   std::vector<std::uint32_t> begins_;
 };
+
+/// Of cells: what nearly all of these are narrower than. Few are wide, of points where hardly any
+/// ray went.
+float width_for(std::vector<float> angles_rad) {
+  const auto high = angles_rad.begin() + static_cast<std::ptrdiff_t>(angles_rad.size() * 19 / 20);
+  std::ranges::nth_element(angles_rad, high);
+  return *high;
+}
 
 /// Marks those of these points that are isolated; returns how many.
 std::size_t mark(std::span<const Eigen::Vector3f> points, std::span<const float> angles_rad,
@@ -115,10 +128,9 @@ std::size_t mark(std::span<const Eigen::Vector3f> points, std::span<const float>
       const std::uint32_t i = asked[k];
       const float range_m = points[i].norm();
       if (range_m > reach_m) continue;
-      // No farther than the cells round its own go, which is less than the noise near the lidar.
-      const float beside_m = std::min(std::hypot(range_m * angles_rad[i], range_noise_m),
-                                      range_m * directions.angle_rad());
-      isolated[i] = directions.is_alone(points, i, beside_m) ? 1 : 0;
+      const float noise_rad = range_noise_m / std::max(range_m, 1e-3F);
+      const float beside_rad = std::min(std::hypot(angles_rad[i], noise_rad), max_angle_rad);
+      isolated[i] = directions.is_alone(points, i, beside_rad) ? 1 : 0;
     }
   });
   return static_cast<std::size_t>(
@@ -137,7 +149,7 @@ std::vector<std::uint8_t> isolated_points(std::span<const Eigen::Vector3f> point
     (first[i] ? asked_first : others).push_back(i);
   }
   if (asked_first.empty()) return {};
-  const Directions directions(points_lidar, *std::ranges::max_element(angles_rad));
+  const Directions directions(points_lidar, width_for(angles_rad));
   std::vector<std::uint8_t> isolated(points_lidar.size());
   const auto found =
       static_cast<double>(mark(points_lidar, angles_rad, directions, asked_first, isolated));
