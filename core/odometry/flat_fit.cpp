@@ -14,7 +14,7 @@ constexpr double beside_m = 0.6;
 /// What the fit must lose there. Of most sound drives the mean of some scans is 0.036 and more (a
 /// motorway between noise barriers; among crops 0.08, in streets 0.1 to 0.4), of car parks by 16
 /// rings 0.018, and of drives that slide between plants less than 0.01.
-constexpr double min_mean_lost = 0.01;
+constexpr double min_mean_lost = 0.015;
 /// Weight of the newest scan in the running mean, and as much as one counts for at most: what is
 /// clear again is believed soon.
 constexpr double mean_gain = 0.2;

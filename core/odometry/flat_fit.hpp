@@ -11,15 +11,15 @@ namespace stillmap {
 class FlatFit {
  public:
   /// `found`, but degenerate instead of good where this scan and those before lie as well beside.
-  /// What it says of a lost one is nothing, nor of one by
-  /// features of single rings. Not of the paper's own method.
+  /// It says nothing of a lost one, nor of one by features of single rings. Not of the paper's own
+  /// method.
   [[nodiscard]] OdometryResult doubted(OdometryResult found, const FeatureSets& features,
                                        const LocalMap& map, const OdometryConfig& config);
 
  private:
   /// Running mean of what the fit loses to the side, 0..1; negative where it lies better there. It
-  /// begins clear: the first scan alone may be chance.
-  double mean_lost_ = 0.1;
+  /// begins above the limit: the first scan alone may be chance.
+  double mean_lost_ = 0.04;
   /// Scans since it was asked for last.
   int unasked_ = 0;
 };

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <numbers>
 #include <random>
+#include <utility>
 
 #include "core/odometry/odometry.hpp"
 #include "core/odometry/scan_features.hpp"
@@ -124,6 +125,19 @@ Scan scan_over_crops(double x_m, double time_s, std::mt19937& random) {
            3.0F + in_tree(random)},
           std::max(0, 31 - k));
   return scan;
+}
+
+TEST(FlatFit, SaysNothingOfFeaturesOfSingleRings) {
+  const LocalMap grass = map_of(/*is_grass=*/true);
+  const OdometryConfig config;
+  FeatureSets features = points_round_the_lidar(/*is_grass=*/true, 7);
+  OdometryResult found = register_features(features, grass, Eigen::Isometry3d::Identity(), config);
+  found.health = OdometryHealth::good;
+  features.planes = std::move(features.surfaces);
+  features.surfaces.clear();
+  FlatFit fit;
+  for (int k = 0; k < 40; ++k)
+    EXPECT_EQ(fit.doubted(found, features, grass, config).health, OdometryHealth::good) << k;
 }
 
 TEST(FlatFit, APoseThatHoldsOnToCropsIsNotGood) {
