@@ -1,9 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
+#include <random>
 #include <string>
+#include <vector>
 
 #include "core/odometry/odometry.hpp"
+#include "core/odometry/ring_order.hpp"
 #include "tests/odometry/box_world.hpp"
 #include "tests/odometry/register_scan.hpp"
 
@@ -25,6 +29,32 @@ struct CoarseLidar {
     return sensor;
   }
 };
+
+/// A ring of so many rays round the lidar, each of which returns so often.
+std::vector<Eigen::Vector3f> ring_of(int rays, int returns, double share_that_return = 1.0) {
+  std::mt19937 random(1);
+  std::bernoulli_distribution does_return(share_that_return);
+  std::vector<Eigen::Vector3f> ring;
+  for (int k = 0; k < rays; ++k) {
+    const float angle_rad =
+        2.0F * std::numbers::pi_v<float> * static_cast<float>(k) / static_cast<float>(rays);
+    if (!does_return(random)) continue;
+    for (int n = 0; n < returns; ++n)
+      ring.emplace_back((9.0F + static_cast<float>(n)) *
+                        Eigen::Vector3f(std::cos(angle_rad), std::sin(angle_rad), 0.0F));
+  }
+  return ring;
+}
+
+TEST(RayStep, IsThatOfTheRaysWhateverReturns) {
+  constexpr double step_rad = 2.0 * std::numbers::pi / 1800.0;
+  EXPECT_NEAR(ray_step_rad(ring_of(1800, 1)), step_rad, 0.02 * step_rad);
+  // Most steps are gaps of several rays.
+  EXPECT_NEAR(ray_step_rad(ring_of(1800, 1, 0.25)), step_rad, 0.02 * step_rad);
+  EXPECT_NEAR(ray_step_rad(ring_of(225, 2)), 8.0 * step_rad, 0.16 * step_rad);
+  EXPECT_EQ(ray_step_rad(std::vector<Eigen::Vector3f>(3, Eigen::Vector3f::Zero())), 0.0F);
+  EXPECT_EQ(ray_step_rad({}), 0.0F);
+}
 
 class CoarseColumns : public testing::TestWithParam<CoarseLidar> {};
 
