@@ -126,10 +126,7 @@ class UpwardView {
     if (own.points_submap.size() < min_higher) return;
     std::vector<float> rises;
     rises.reserve(own.points_submap.size());
-    for (const Eigen::Vector3f& p : own.points_submap) {
-      const Eigen::Vector3f p_key = T_key_own_ * p;
-      rises.push_back(p_key.z() / (p_key.head<2>().norm() + half_way_m));
-    }
+    for (const Eigen::Vector3f& p : own.points_submap) rises.push_back(rise_of(T_key_own_ * p));
     const auto last = rises.begin() + static_cast<std::ptrdiff_t>(min_higher - 1);
     std::ranges::nth_element(rises, last, std::greater<>());
     rise_ = *last;
@@ -137,13 +134,16 @@ class UpwardView {
 
   /// Whether it must have seen this point from somewhere on its way.
   [[nodiscard]] bool reaches(const Eigen::Vector3f& p) const {
-    const Eigen::Vector3f p_key = T_key_own_ * p;
-    return p_key.z() <= rise_ * std::hypot(std::abs(p_key.x()) + half_way_m, p_key.y());
+    return rise_of(T_key_own_ * p) <= rise_;
   }
 
  private:
+  /// Of a beam from the farthest place of a way that goes straight on.
+  [[nodiscard]] static float rise_of(const Eigen::Vector3f& p_key) {
+    return p_key.z() / std::hypot(std::abs(p_key.x()) + half_way_m, p_key.y());
+  }
+
   Eigen::Isometry3f T_key_own_;
-  /// Of the beams, had each come from farther than any place of the way, however that bends.
   float rise_ = std::numeric_limits<float>::lowest();
 };
 
