@@ -35,6 +35,16 @@ bool is_port_name(const std::string& name) { return name.starts_with("fastrtps_p
 
 fs::path beside(const fs::path& file, const std::string& ending) { return file.string() + ending; }
 
+bool is_of_the_dead(const fs::path& segment) {
+  return !is_locked(beside(segment, "_el")) && !is_locked(beside(segment, "_sl"));
+}
+
+std::chrono::seconds age_of(const struct stat& facts) {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  // A file may be newer than now: the clock was set back since.
+  return std::chrono::seconds(std::max<std::time_t>(now - facts.st_mtim.tv_sec, 0));
+}
+
 void remove_segment(const fs::path& folder, const std::string& name) {
   const fs::path file = folder / name;
   std::error_code ignored;
@@ -44,33 +54,38 @@ void remove_segment(const fs::path& folder, const std::string& name) {
   }
 }
 
-}  // namespace
-
-std::vector<SharedMemorySegment> shared_memory_segments(const fs::path& folder) {
+/// The segments that were made so long ago at least. The locks of younger ones are not tried: who
+/// makes one could find it taken.
+std::vector<SharedMemorySegment> segments_of_age(const fs::path& folder,
+                                                 std::chrono::seconds min_age) {
   std::vector<SharedMemorySegment> segments;
-  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
     struct stat facts {};
     if (!is_segment_name(name) || ::stat(entry.path().c_str(), &facts) != 0) continue;
-    segments.push_back(
-        {.name = name,
-         .bytes = static_cast<std::uint64_t>(facts.st_size),
-         .owner = facts.st_uid,
-         // A file may be newer than now: the clock was set back since.
-         .age = std::chrono::seconds(std::max<std::time_t>(now - facts.st_mtim.tv_sec, 0)),
-         .is_stale =
-             !is_locked(beside(entry.path(), "_el")) && !is_locked(beside(entry.path(), "_sl"))});
+    const std::chrono::seconds age = age_of(facts);
+    if (age < min_age) continue;
+    segments.push_back({.name = name,
+                        .bytes = static_cast<std::uint64_t>(facts.st_size),
+                        .owner = facts.st_uid,
+                        .age = age,
+                        .is_stale = is_of_the_dead(entry.path())});
   }
   return segments;
+}
+
+}  // namespace
+
+std::vector<SharedMemorySegment> shared_memory_segments(const fs::path& folder) {
+  return segments_of_age(folder, std::chrono::seconds(0));
 }
 
 int remove_stale_segments(const fs::path& folder, std::chrono::seconds min_age,
                           StaleSegments which) {
   int removed = 0;
-  for (const SharedMemorySegment& segment : shared_memory_segments(folder)) {
-    if (!segment.is_stale || segment.age < min_age) continue;
+  for (const SharedMemorySegment& segment : segments_of_age(folder, min_age)) {
+    if (!segment.is_stale) continue;
     if (which == StaleSegments::without_ports && is_port_name(segment.name)) continue;
     remove_segment(folder, segment.name);
     if (!fs::exists(folder / segment.name)) ++removed;

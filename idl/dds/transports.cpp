@@ -37,20 +37,16 @@ std::optional<std::uint64_t> free_shared_memory_mib() {
   return (std::uint64_t{room.f_bavail} * room.f_frsize) >> 20U;
 }
 
-/// Without room for it, a process that writes into its segment ends with a bus error. Where there
-/// is none, what processes left that were killed goes first: a server that is killed and started
-/// again for weeks would else fill the folder, and then start no more.
+/// Without room for it, a process that writes into its segment ends with a bus error. What
+/// processes left that were killed goes first: a server that is killed and started again for weeks
+/// would else take the machine's memory, 64 MB each time.
 void require_shared_memory_room(std::uint64_t segment_mib) {
   // Beside the segment: the ports' queues.
   constexpr std::uint64_t margin_mib = 4;
   constexpr std::chrono::seconds min_age(10);
   const std::uint64_t needed_mib = segment_mib + margin_mib;
-  const auto is_enough = [&] {
-    return free_shared_memory_mib().value_or(needed_mib) >= needed_mib;
-  };
-  if (is_enough()) return;
   remove_stale_segments(shared_memory_folder, min_age, StaleSegments::without_ports);
-  if (is_enough()) return;
+  if (free_shared_memory_mib().value_or(needed_mib) >= needed_mib) return;
   throw DdsError(
       "/dev/shm has " + std::to_string(free_shared_memory_mib().value_or(0)) +
       " MiB free, shared memory takes " + std::to_string(needed_mib) +
