@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -15,9 +16,9 @@ namespace stillmap {
 class CoarseCells {
  public:
   /// `resolution_m` is not finer than the map's voxels. A voxel belongs to the cell that its mean
-  /// lies in.
-  /// `expected` cells have room at once; there may be more.
-  explicit CoarseCells(double resolution_m, std::size_t expected = 0);
+  /// lies in; the means of all lie in `bounds_map` [m]. `expected` cells have room at once; there
+  /// may be more.
+  CoarseCells(double resolution_m, const Eigen::AlignedBox3f& bounds_map, std::size_t expected);
   ~CoarseCells();
   CoarseCells(const CoarseCells&) = delete;
   CoarseCells& operator=(const CoarseCells&) = delete;

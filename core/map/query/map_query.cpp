@@ -207,13 +207,21 @@ std::uint64_t voxel_count(const Selection& from, std::span<const std::size_t> ti
   return count;
 }
 
+/// Where the voxels of these tiles lie, map frame [m].
+Eigen::AlignedBox3f bounds_map(const Selection& from, std::span<const std::size_t> tiles) {
+  Eigen::AlignedBox3f bounds;
+  for (const std::size_t i : tiles) bounds.extend(from.tiles[i]->info.bounds_map);
+  return bounds;
+}
+
 /// The cells of one strip of a coarser answer, merged from the tiles that reach into it.
 std::vector<QueryVoxel> merge(const Selection& from, const CoarseStrips& strips,
                               std::size_t strip) {
   // So many of a surface meet in one.
   const double edge = from.query.resolution_m / from.view.voxel_size_m;
   const auto voxels = static_cast<double>(voxel_count(from, strips.tiles(strip)));
-  CoarseCells cells(from.query.resolution_m, static_cast<std::size_t>(voxels / (edge * edge)));
+  CoarseCells cells(from.query.resolution_m, bounds_map(from, strips.tiles(strip)),
+                    static_cast<std::size_t>(voxels / (edge * edge)));
   for (const std::size_t i : strips.tiles(strip)) {
     const auto tile = from.reader.read(from.tiles[i]);
     const VoxelFilter filter(from.query, from.region, *tile);
