@@ -15,6 +15,7 @@
 #include "config/loaders/openmp_waits.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "core/process/stop_signals.hpp"
+#include "core/segmentation/model_error.hpp"
 #include "idl/dds/dds_error.hpp"
 #include "idl/dds/dds_log.hpp"
 #include "server/arguments.hpp"
@@ -118,6 +119,9 @@ int main(int argc, char** argv) {
     stillmap::server::set_log_level(arguments.config->log.level);
     return serve_in_file(*arguments.config);
   } catch (const stillmap::ConfigError& error) {
+    spdlog::critical("{}", error.what());
+    return bad_input;
+  } catch (const stillmap::ModelError& error) {
     spdlog::critical("{}", error.what());
     return bad_input;
   } catch (const stillmap::dds::SecurityError& error) {

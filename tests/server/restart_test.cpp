@@ -267,6 +267,34 @@ TEST(Restart, AMapHasANewIdInEveryRun) {
   EXPECT_EQ(note_id(), 3U);
 }
 
+/// A model folder whose description is sound, and whose network is none.
+std::filesystem::path model_without_network(const ScratchFolder& folder) {
+  const std::filesystem::path model = folder / "model";
+  std::filesystem::create_directory(model);
+  std::ofstream(model / "model.yaml")
+      << "{name: damaged, licence: MIT, sensor: any, training: none, accuracy: unknown,\n"
+      << "image: {rows: 64, columns: 512, fov_up_deg: 3, fov_down_deg: -25},\n"
+      << "statistics: {range: {mean: 12, deviation: 12}, x: {mean: 11, deviation: 11},\n"
+      << "  y: {mean: 0, deviation: 7}, z: {mean: -1, deviation: 1},\n"
+      << "  remission: {mean: 0.2, deviation: 0.2}},\n"
+      << "classes: {0: unlabeled, 1: car}}\n";
+  std::ofstream(model / "model.onnx") << "half a download";
+  return model;
+}
+
+TEST(Startup, RefusesAModelThatCannotBeUsedAsItDoesAConfiguration) {
+  const ScratchFolder folder;
+  const std::filesystem::path file = folder / "server.yaml";
+  std::ofstream(file) << "labels: {source: model, model: " << model_without_network(folder).string()
+                      << "}\n";
+  for (const char* const option : {"--config", "--check-config"}) {
+    testing::internal::CaptureStderr();
+    ServerProcess server({option, file.string(), "--domain", "231"});
+    EXPECT_EQ(server.wait_for_exit(patience), 2) << option;
+    EXPECT_THAT(testing::internal::GetCapturedStderr(), testing::HasSubstr("model.onnx"));
+  }
+}
+
 TEST(Startup, RefusesWhatCannotWorkWithAnExitCode) {
   const ScratchFolder folder;
   std::ofstream(folder / "wrong.yaml") << "no_such_field: 1\n";
