@@ -1,9 +1,11 @@
 #include "server/arguments.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <iostream>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <span>
@@ -187,11 +189,12 @@ void add_server_options(CLI::App& program, ServerArguments& server) {
 std::string meant_option(const CLI::App& program, std::span<char* const> words) {
   std::vector<std::string> known;
   for (const CLI::Option* option : program.get_options())
-    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+    std::ranges::copy(option->get_lnames(), std::back_inserter(known));
   for (const std::string word : words) {
     const std::string name = word.substr(0, word.find('='));
     if (!name.starts_with("--") || program.get_option_no_throw(name) != nullptr) continue;
-    if (const std::string meant = closest_name(name, known); !meant.empty()) return meant;
+    if (const std::string meant = closest_name(name.substr(2), known); !meant.empty())
+      return "--" + meant;
   }
   return {};
 }

@@ -9,13 +9,14 @@
 #include <cmath>
 #include <cstdlib>
 #include <iostream>
+#include <iterator>
 #include <limits>
-#include <numeric>
 #include <span>
 #include <sstream>
 #include <string>
-#include <utility>
 #include <vector>
+
+#include "config/loaders/closest_name.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -64,38 +65,6 @@ bool is_numbers(const std::string& word) {
   return is_some;
 }
 
-/// Letters to change, add, leave out, or swap with the next between two words (Damerau).
-std::size_t edits_between(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> before(b.size() + 1);
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::vector<std::size_t> next(b.size() + 1, i + 1);
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t changed = row[j] + (a[i] == b[j] ? 0 : 1);
-      next[j + 1] = std::min({changed, next[j] + 1, row[j + 1] + 1});
-      if (i > 0 && j > 0 && a[i] == b[j - 1] && a[i - 1] == b[j])
-        next[j + 1] = std::min(next[j + 1], before[j - 1] + 1);
-    }
-    before = std::exchange(row, std::move(next));
-  }
-  return row.back();
-}
-
-/// Empty where no name is near to the word.
-std::string nearest(const std::string& word, const std::vector<std::string>& names) {
-  std::size_t least = std::max<std::size_t>(1, word.size() / 3) + 1;
-  std::string found;
-  for (const std::string& name : names) {
-    const std::size_t edits = edits_between(word, name);
-    if (edits < least) {
-      least = edits;
-      found = name;
-    }
-  }
-  return found;
-}
-
 std::vector<std::string> command_names(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
@@ -132,11 +101,11 @@ void end_lists_of_numbers(const CLI::App& program, std::vector<std::string>& wor
   }
 }
 
+/// Without "--".
 std::vector<std::string> option_names(const CLI::App& app) {
   std::vector<std::string> names;
-  for (const CLI::Option* option : app.get_options()) {
-    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-  }
+  for (const CLI::Option* option : app.get_options())
+    std::ranges::copy(option->get_lnames(), std::back_inserter(names));
   return names;
 }
 
@@ -148,16 +117,36 @@ std::string meant(const CLI::App& program, std::span<const std::string> words) {
     if (word.starts_with("--")) {
       const std::string name = word.substr(0, word.find('='));
       if (app->get_option_no_throw(name) == nullptr) {
-        const std::string option = nearest(name, option_names(*app));
-        if (!option.empty()) return option;
+        const std::string option = closest_name(name.substr(2), option_names(*app));
+        if (!option.empty()) return "--" + option;
       }
     } else if (const CLI::App* const command = command_of(*app, word)) {
       app = command;
     } else if (app->get_require_subcommand_min() > 0) {
-      return nearest(word, command_names(*app));
+      return closest_name(word, command_names(*app));
     }
   }
   return {};
+}
+
+/// Whether one of the commands below the last one that was named must be, too.
+bool lacks_command(const CLI::App& program) {
+  const CLI::App* app = &program;
+  while (!app->get_subcommands().empty()) app = app->get_subcommands().back();
+  return app->get_require_subcommand_min() > 0;
+}
+
+/// What CLI11 says, but of words that mean nothing: it names them last first, or, where a command
+/// is missing, not at all.
+std::string describe_fault(const CLI::App* program, const CLI::Error& fault) {
+  const std::vector<std::string> unknown = program->remaining(true);
+  std::string text = fault.what();
+  if (lacks_command(*program) && !unknown.empty() && !unknown.front().starts_with('-')) {
+    text = "there is no command '" + unknown.front() + "'";
+  } else if (fault.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError)) {
+    text = "not expected here: " + CLI::detail::join(unknown, " ");
+  }
+  return text + "\nRun with --help for more information.\n";
 }
 
 /// A wrong value that nobody wrote: names the environment's variable that it came from.
@@ -340,6 +329,7 @@ CommandLine::CommandLine(const std::string& program, const std::string& version,
     : app_(std::make_unique<CLI::App>(help, program)) {
   app_->set_version_flag("--version", version);
   app_->get_formatter()->column_width(36);
+  app_->failure_message(describe_fault);
 }
 
 CommandLine::~CommandLine() = default;

@@ -2,23 +2,26 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 namespace stillmap {
 namespace {
 
-/// Levenshtein's distance: letters to insert, delete or replace.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
+/// Letters to change, add, leave out, or swap with the next between two words (Damerau).
+std::size_t edits_between(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> before(b.size() + 1);
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({replaced, row[j] + 1, row[j - 1] + 1});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::vector<std::size_t> next(b.size() + 1, i + 1);
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t changed = row[j] + (a[i] == b[j] ? 0 : 1);
+      next[j + 1] = std::min({changed, next[j] + 1, row[j + 1] + 1});
+      if (i > 0 && j > 0 && a[i] == b[j - 1] && a[i - 1] == b[j])
+        next[j + 1] = std::min(next[j + 1], before[j - 1] + 1);
     }
+    before = std::exchange(row, std::move(next));
   }
   return row.back();
 }
@@ -32,9 +35,9 @@ std::string closest_name(std::string_view written, std::span<const std::string> 
   std::size_t best = written.size() / 3 + 2;
   for (const std::string& name : known) {
     const bool unit_missing = name.starts_with(std::string(written) + '_');
-    const std::size_t distance = unit_missing ? 1 : edit_distance(written, name);
-    if (distance >= best) continue;
-    best = distance;
+    const std::size_t edits = unit_missing ? 1 : edits_between(written, name);
+    if (edits >= best) continue;
+    best = edits;
     closest = name;
   }
   return closest;

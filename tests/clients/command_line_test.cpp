@@ -110,9 +110,11 @@ std::string fault_of(const std::vector<std::string>& words) {
   int domain = 0;
   line.root().require_command();
   CommandHandle map = line.root().command("map", "");
-  map.option("--scale", scale, "");
+  map.option("--scale,--peer", scale, "");
   map.option("--domain", domain, "").from_environment("STILLMAP_TEST_DOMAIN").between(0, 10);
   line.root().command("replay", "").command("again", "");
+  std::string as;
+  line.root().command("save", "").option("--as", as, "").required();
   testing::internal::CaptureStderr();
   const CommandLine::Parsed parsed = parse(line, words);
   const std::string fault = testing::internal::GetCapturedStderr();
@@ -125,10 +127,22 @@ TEST(CommandLine, NamesWhatWasMeant) {
   EXPECT_THAT(fault_of({"replya", "x"}), HasSubstr("Did you mean 'replay'?"));
   EXPECT_THAT(fault_of({"map", "--scael", "2"}), HasSubstr("Did you mean '--scale'?"));
   EXPECT_THAT(fault_of({"map", "--scales=2"}), HasSubstr("Did you mean '--scale'?"));
-  for (const std::vector<std::string>& words :
-       {std::vector<std::string>{"segment"}, {}, {"map", "--width", "2"}, {"map", "x"}}) {
+  for (const std::vector<std::string>& words : {std::vector<std::string>{"segment"},
+                                                {},
+                                                {"map", "--width", "2"},
+                                                {"map", "--other"},
+                                                {"map", "x"}}) {
     EXPECT_THAT(fault_of(words), Not(HasSubstr("Did you mean")));
   }
+}
+
+TEST(CommandLine, NamesWhatMeansNothingInTheOrderInWhichItStands) {
+  EXPECT_THAT(fault_of({"segment"}), HasSubstr("no command 'segment'"));
+  EXPECT_THAT(fault_of({"replay", "later"}), HasSubstr("not expected here: later\n"));
+  EXPECT_THAT(fault_of({"map", "--width", "2", "--x=3"}),
+              HasSubstr("not expected here: --width 2 --x=3\n"));
+  EXPECT_THAT(fault_of({}), HasSubstr("A subcommand is required"));
+  EXPECT_THAT(fault_of({"save", "here", "there"}), HasSubstr("--as is required"));
 }
 
 TEST(CommandLine, NamesTheVariableThatAWrongValueCameFrom) {
