@@ -330,10 +330,13 @@ TEST_F(EvaluateCommandTest, NamesWhatADriveCannotBe) {
   const std::vector<std::pair<std::string, std::string>> faults{
       {"sim:yard,seeds=3", "seeds=3"},
       {"sim:yard,seed=three", "seed=three"},
+      {"sim:yard,traffic=crowd", "traffic=crowd"},
+      {"sim:yard,traffic=11", "traffic is 11"},
       {"sim:village", "village"},
       {"sim:yard --mutate flood", "flood"},
       {"sim:yard --labels wrong", "wrong"},
       {path("city") + " --mutate other_place", "--other-place"},
+      {path("city") + " --other-place " + path("city"), "--mutate other_place"},
       {path("missing"), "missing"}};
   for (const auto& [arguments, message] : faults) {
     const ProcessResult result = run("evaluate drives " + arguments);

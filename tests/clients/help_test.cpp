@@ -113,10 +113,26 @@ TEST_F(HelpTest, WhatSaysNothingAloneNamesWhatItNeeds) {
         std::pair("query --since-map 3", "--since-version"),
         std::pair("plan --to 1,1 --count 3", "--follow"),
         std::pair("plan --to 1,1 --duration 3", "--follow"),
-        std::pair("octomap --resolution 0.5", "--map")}) {
+        std::pair("octomap --resolution 0.5", "--map"),
+        std::pair("octomap --max-range 20", "--ray"),
+        std::pair("octomap --through-unknown", "--ray"),
+        std::pair("octomap --max-voxels 3", "--box"),
+        std::pair("traversable --min-outline-area 2", "--outlines"),
+        std::pair("simulate x --gnss-delay 0.1", "--gnss"),
+        std::pair("replay x --base robot", "--mount"),
+        std::pair("dataset sensor x --scans 50", "--calibrate")}) {
     const ProcessResult result = run(command);
     EXPECT_EQ(result.exit_code, 2) << command;
     EXPECT_THAT(result.err, HasSubstr(std::string("requires ") + needed)) << command;
+  }
+}
+
+TEST_F(HelpTest, WhatSaysNothingOfALiveTopicIsRefused) {
+  for (const std::string option :
+       {"--start 3", "--strict", "--topic-in points", "--label-kind classes"}) {
+    const ProcessResult result = run("dataset export topic:points x " + option);
+    EXPECT_EQ(result.exit_code, 2) << option;
+    EXPECT_THAT(result.err, HasSubstr(option.substr(0, option.find(' ')) + " is of recordings"));
   }
 }
 

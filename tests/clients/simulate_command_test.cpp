@@ -1,4 +1,7 @@
+#include <algorithm>
 #include <csignal>
+#include <cstring>
+#include <vector>
 
 #include "tests/clients/command_test.hpp"
 
@@ -56,6 +59,21 @@ TEST_F(SimulateCommandTest, DrawsAnyCityAndTheFlawsOfItsLidar) {
               HasSubstr("sim:any,seed=608"));
 }
 
+TEST_F(SimulateCommandTest, NothingMovesWithoutTraffic) {
+  ASSERT_EQ(run("simulate " + path("empty") +
+                " --preset crowd --traffic 0 --sensor vlp_16 --scans 1 --seed 1")
+                .exit_code,
+            0);
+  const std::string bytes = content("empty/labels/000000.label");
+  std::vector<std::uint32_t> labels(bytes.size() / sizeof(std::uint32_t));
+  std::memcpy(labels.data(), bytes.data(), labels.size() * sizeof(std::uint32_t));
+  ASSERT_GT(labels.size(), 10'000U);
+  constexpr std::uint32_t first_moving_id = 252;
+  EXPECT_EQ(std::ranges::count_if(
+                labels, [](std::uint32_t label) { return (label & 0xFFFFU) >= first_moving_id; }),
+            0);
+}
+
 TEST_F(SimulateCommandTest, PrintsJsonWhenAsked) {
   const ProcessResult result = run("simulate " + path("city") +
                                    " --preset yard --sensor vlp16 --scans 1 --traffic 0 --json");
@@ -77,7 +95,11 @@ TEST_F(SimulateCommandTest, RefusesWhatItDoesNotKnow) {
   EXPECT_EQ(run(out + " --scans 0").exit_code, 2);
   EXPECT_EQ(run(out + " --scans -5").exit_code, 2);
   EXPECT_THAT(run(out + " --seed -1").err, HasSubstr("--seed"));
-  EXPECT_EQ(run(out + " --traffic -1").exit_code, 2);
+  for (const std::string traffic : {"-1", "nan", "11", "crowd"}) {
+    const ProcessResult result = run(out + " --traffic " + traffic);
+    EXPECT_EQ(result.exit_code, 2) << traffic;
+    EXPECT_THAT(result.err, HasSubstr("--traffic")) << traffic;
+  }
   const ProcessResult preset = run(out + " --preset moon");
   EXPECT_EQ(preset.exit_code, 2);
   EXPECT_THAT(preset.err, HasSubstr("moon"));

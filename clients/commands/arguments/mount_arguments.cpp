@@ -52,17 +52,18 @@ MappedBody body_of(const MountArguments& mount, const std::string& file) {
   return {base, server.mount.T_base_lidar};
 }
 
-void add_mount_option(CommandHandle command, MountArguments& arguments, const std::string& help) {
-  command
+OptionHandle add_mount_option(CommandHandle command, MountArguments& arguments,
+                              const std::string& help) {
+  return command
       .option("--mount", arguments.xyz_rpy,
               help + ": x,y,z [m],roll,pitch,yaw [deg] of the lidar on the robot, as in a URDF")
       .exactly(6)
       .comma_separated();
 }
 
-void add_frame_option(CommandHandle command, const std::string& option, std::string& frame,
-                      const std::string& help) {
-  command.option(option, frame, help).corrected(to_frame_name).with_default();
+OptionHandle add_frame_option(CommandHandle command, const std::string& option, std::string& frame,
+                              const std::string& help) {
+  return command.option(option, frame, help).corrected(to_frame_name).with_default();
 }
 
 }  // namespace stillmap::cli

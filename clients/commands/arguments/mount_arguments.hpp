@@ -31,11 +31,12 @@ struct MappedBody {
 [[nodiscard]] MappedBody body_of(const MountArguments& mount, const std::string& config_file);
 
 /// Adds --mount; `help` says what it is for.
-void add_mount_option(CommandHandle command, MountArguments& arguments, const std::string& help);
+OptionHandle add_mount_option(CommandHandle command, MountArguments& arguments,
+                              const std::string& help);
 
 /// Adds an option for the name of a frame. A '/' at its front, with which tf2 looks up none, is
 /// taken away.
-void add_frame_option(CommandHandle command, const std::string& option, std::string& frame,
-                      const std::string& help);
+OptionHandle add_frame_option(CommandHandle command, const std::string& option, std::string& frame,
+                              const std::string& help);
 
 }  // namespace stillmap::cli

@@ -1,7 +1,6 @@
 #include "clients/commands/arguments/simulation_arguments.hpp"
 
 #include <cmath>
-#include <optional>
 #include <stdexcept>
 
 #include "config/loaders/sensor_file.hpp"
@@ -10,24 +9,19 @@
 namespace stillmap::cli {
 namespace {
 
+/// Throws std::invalid_argument for a factor out of its limits.
 void scale(simulation::TrafficPlan& traffic, double factor) {
+  // Written so that NaN fails.
+  if (!(factor >= 0.0 && factor <= 10.0)) {
+    throw std::invalid_argument("the factor on traffic is " + std::to_string(factor) +
+                                "; it must be 0 to 10");
+  }
   traffic.vehicles_per_km *= factor;
   traffic.cyclists_per_km *= factor;
   traffic.pedestrians_per_km *= factor;
   traffic.crossing_pedestrians =
       static_cast<int>(std::lround(factor * traffic.crossing_pedestrians));
-}
-
-// The factor that the text is, nothing if it is a word.
-std::optional<double> number_in(const std::string& text) {
-  try {
-    std::size_t read = 0;
-    const double number = std::stod(text, &read);
-    if (read == text.size()) return number;
-  } catch (const std::logic_error&) {
-    return std::nullopt;  // No number at all, or one beyond all doubles.
-  }
-  return std::nullopt;
+  traffic.escorted = traffic.escorted && factor > 0.0;
 }
 
 // Not a plan of its own: city, materials and the lidar's flaws are drawn from the seed.
@@ -40,20 +34,6 @@ simulation::CityPlan plan_of(const std::string& preset) {
     throw std::invalid_argument(std::string(unknown.what()) + " '" + any_preset +
                                 "' draws one by the seed.");
   }
-}
-
-void change_traffic(const std::string& traffic, simulation::CityPlan& plan) {
-  if (traffic.empty()) return;
-  const std::optional<double> factor = number_in(traffic);
-  if (!factor) {
-    plan = simulation::city_plan(traffic);
-    return;
-  }
-  if (!(*factor >= 0.0 && *factor <= 10.0)) {
-    throw std::invalid_argument("traffic '" + traffic +
-                                "' is not a factor from 0 to 10 or the name of a preset");
-  }
-  scale(plan.traffic, *factor);
 }
 
 // hdl64 and vlp16 are what people type.
@@ -83,7 +63,7 @@ simulation::SimulationConfig simulation_config(const SimulationArguments& argume
     config = simulation::any_sequence(arguments.seed, sensor);
   else
     config.plan = plan_of(arguments.preset);
-  change_traffic(arguments.traffic, config.plan);
+  scale(config.plan.traffic, arguments.traffic);
   config.seed = arguments.seed;
   config.day = arguments.day;
   config.sensor = sensor;

@@ -11,8 +11,8 @@ namespace stillmap::cli {
 /// How a command line asks for a simulated sequence.
 struct SimulationArguments {
   std::string preset = "quiet";
-  /// A factor on everything that moves ("0.5"), or the name of a preset; empty: as the preset has.
-  std::string traffic;
+  /// Factor on everything that moves, 0 to 10.
+  double traffic = 1.0;
   std::string sensor = "hdl_64e";
   std::uint64_t seed = 1;
   std::uint64_t day = 0;

@@ -139,11 +139,24 @@ ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopS
   return summary;
 }
 
+/// Throws std::invalid_argument for an option that says nothing of a topic.
+void check_options_of_topic(const DatasetExportArguments& arguments) {
+  const char* const option = arguments.range.first != 0                ? "--start"
+                             : arguments.range.strict                  ? "--strict"
+                             : !arguments.recording.topic_in.empty()   ? "--topic-in"
+                             : !arguments.recording.label_kind.empty() ? "--label-kind"
+                                                                       : nullptr;
+  if (option == nullptr) return;
+  throw std::invalid_argument(std::string(option) + " is of recordings, and " + arguments.source +
+                              " is a live topic: leave it out");
+}
+
 ExportSummary export_from_topic(const DatasetExportArguments& arguments, StopSignal& stop) {
   std::string topic = arguments.source.substr(topic_prefix.size());
   if (const std::string fault = to_topic_name(topic); !fault.empty()) {
     throw std::invalid_argument("SOURCE " + arguments.source + ": " + fault);
   }
+  check_options_of_topic(arguments);
   ServerConfig config;
   if (!arguments.mapper.config_file.empty()) {
     config = load_server_config(arguments.mapper.config_file);

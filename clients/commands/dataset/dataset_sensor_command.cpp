@@ -110,11 +110,13 @@ void add_dataset_sensor_command(CommandHandle dataset, Action& action) {
   command.option("DATASET", arguments->dataset, dataset_kinds).required();
   command.option("--topic-in", arguments->topic, topic_in_help);
   command.option("--out,--output,-o", arguments->out, "Write a sensor file (YAML) for the server");
-  command.flag("--calibrate", arguments->calibrates,
-               "Find by how much the vertical angles are off, by driving several times");
+  const OptionHandle calibrate =
+      command.flag("--calibrate", arguments->calibrates,
+                   "Find by how much the vertical angles are off, by driving several times");
   command.option("--scans", arguments->scans, "Scans to calibrate by")
       .between(min_calibration_scans, 10000)
-      .with_default();
+      .with_default()
+      .needs(calibrate);
   command.explain(
       "Examples:\n"
       "  stillmap dataset sensor bag --out my_lidar.yaml\n"

@@ -261,6 +261,8 @@ Json json_of(const MutatedDrive& drive, const EvaluateDrivesArguments& arguments
 
 ExitCode run(const EvaluateDrivesArguments& arguments) {
   StopSignal stop;
+  if (!arguments.other_place.empty() && arguments.mutation != "other_place")
+    throw std::invalid_argument("--other-place needs --mutate other_place");
   Table table({"drive", "weighting", "path m", "t_err %", "deg/100m", "ATE m", "cm a scan", "worst",
                "good", "degenerate", "lost", "rejected", "wrong", "wrong good", "right lost",
                "voxels", "ms", "p99"});

@@ -104,7 +104,9 @@ void add_evaluate_traversable_command(CommandHandle evaluate, Action& action) {
   command.option("--map", arguments->map, "Map file made from the sequence (map.stillmap)")
       .required();
   command.option("--preset", simulation.preset, "As given to 'stillmap simulate'").with_default();
-  command.option("--traffic", simulation.traffic, "As given to 'stillmap simulate'");
+  command.option("--traffic", simulation.traffic, "As given to 'stillmap simulate'")
+      .zero_to(10)
+      .with_default();
   command.option("--sensor", simulation.sensor, "As given to 'stillmap simulate'").with_default();
   command.option("--seed", simulation.seed, "As given to 'stillmap simulate'").with_default();
   command.option("--day", simulation.day, "As given to 'stillmap simulate'").with_default();

@@ -1,10 +1,13 @@
 #include "clients/commands/evaluate/ground_truth_sequence.hpp"
 
+#include <charconv>
 #include <cmath>
 #include <memory>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
+#include <system_error>
+#include <type_traits>
 
 #include "clients/commands/dataset/recording.hpp"
 #include "core/dataset/scan_dataset.hpp"
@@ -18,16 +21,15 @@ const std::string simulated_prefix = "sim:";
 /// From a city's seed to that of another one.
 constexpr std::uint64_t other_city_seeds = 1000;
 
-int number_of(const std::string& word, const std::string& value) {
-  std::size_t read = 0;
-  try {
-    const int number = std::stoi(value, &read);
-    if (read == value.size()) return number;
-  } catch (const std::logic_error&) {
-    read = 0;  // No number at all, or a longer one; refused below.
-  }
-  throw std::invalid_argument("'" + word + "' in a simulated drive: '" + value +
-                              "' is no whole number");
+/// Throws std::invalid_argument naming the word, KEY=VALUE.
+template <typename Number>
+Number number_of(const std::string& word, const std::string& value) {
+  Number number{};
+  const char* const end = value.data() + value.size();
+  const auto [rest, fault] = std::from_chars(value.data(), end, number);
+  if (fault == std::errc() && rest == end) return number;
+  throw std::invalid_argument("'" + word + "' in a simulated drive: '" + value + "' is no " +
+                              (std::is_integral_v<Number> ? "whole number" : "number"));
 }
 
 /// A simulated drive in words.
@@ -46,15 +48,15 @@ SimulatedDrive simulated_drive(const std::string& name, const SimulationArgument
     const std::string key = word.substr(0, equals);
     const std::string value = equals == std::string::npos ? "" : word.substr(equals + 1);
     if (key == "seed")
-      arguments.seed = static_cast<std::uint64_t>(number_of(word, value));
+      arguments.seed = number_of<std::uint64_t>(word, value);
     else if (key == "scans")
-      arguments.scans = number_of(word, value);
+      arguments.scans = number_of<int>(word, value);
     else if (key == "sensor")
       arguments.sensor = value;
     else if (key == "motion")
       arguments.motion = value;
     else if (key == "traffic")
-      arguments.traffic = value;
+      arguments.traffic = number_of<double>(word, value);
     else if (word == "rolling")
       arguments.rolling = true;
     else if (word == "imu")

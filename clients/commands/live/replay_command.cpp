@@ -450,8 +450,9 @@ void add_replay_command(CommandHandle program, Action& action) {
       .between(1, 1000)
       .with_default();
   add_frame_option(command, "--frame", arguments->frame, "The clouds' frame (header.frame_id)");
-  add_mount_option(command, arguments->mount, "Publish on /tf_static");
-  add_frame_option(command, "--base", arguments->base_frame, "The robot's frame there");
+  const OptionHandle mount = add_mount_option(command, arguments->mount, "Publish on /tf_static");
+  add_frame_option(command, "--base", arguments->base_frame, "The robot's frame there")
+      .needs(mount);
   add_client_options(command, arguments->client);
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(

@@ -320,22 +320,28 @@ void add_octomap_command(CommandHandle program, Action& action) {
       .needs(map);
   command.option("--point", arguments->points, "x,y,z: occupied, free or unknown?")
       .comma_separated();
-  command
-      .option("--box", arguments->boxes,
-              "x_min,y_min,z_min,x_max,y_max,z_max: how many voxels are what")
-      .comma_separated();
-  command
-      .option("--ray", arguments->rays,
-              "x,y,z,dx,dy,dz: what a ray from there in that direction meets first")
-      .comma_separated();
+  const OptionHandle box =
+      command
+          .option("--box", arguments->boxes,
+                  "x_min,y_min,z_min,x_max,y_max,z_max: how many voxels are what")
+          .comma_separated();
+  const OptionHandle ray =
+      command
+          .option("--ray", arguments->rays,
+                  "x,y,z,dx,dy,dz: what a ray from there in that direction meets first")
+          .comma_separated();
   command.option("--max-range", arguments->max_range_m, "Length of rays [m], at most 1000")
-      .with_default();
-  command.flag("--through-unknown", arguments->through_unknown,
-               "Rays continue through unknown space instead of ending there");
+      .with_default()
+      .needs(ray);
+  command
+      .flag("--through-unknown", arguments->through_unknown,
+            "Rays continue through unknown space instead of ending there")
+      .needs(ray);
   command
       .option("--max-voxels", arguments->max_voxels,
               "Occupied voxels that --json lists for all boxes together")
-      .with_default();
+      .with_default()
+      .needs(box);
   add_client_options(command, arguments->client);
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(

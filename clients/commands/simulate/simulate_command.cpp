@@ -104,6 +104,25 @@ ExitCode run(const SimulateArguments& arguments) {
   return ExitCode::failed;
 }
 
+/// Options for what is written beside the scans.
+void add_recorded_beside(CommandHandle command, SimulateArguments& arguments) {
+  command.flag("--imu", arguments.imu,
+               "Write imu.csv, too: an IMU at the lidar, 200 Hz, with noise and bias");
+  const OptionHandle gnss =
+      command
+          .option("--gnss", arguments.gnss_m,
+                  "Write gnss.csv, too: an antenna at the lidar, 5 Hz, that errs by so many metres "
+                  "for a minute, and by more beside houses (0.02: with corrections, 1.5: without)")
+          .above_zero();
+  command
+      .option(
+          "--gnss-delay", arguments.gnss_delay_s,
+          "Its stamps are so many seconds late, as of a receiver that stamps what it sends when "
+          "it sends it (0.1), or that has GPS time (18)")
+      .with_default()
+      .needs(gnss);
+}
+
 }  // namespace
 
 void add_simulate_command(CommandHandle program, Action& action) {
@@ -118,8 +137,11 @@ void add_simulate_command(CommandHandle program, Action& action) {
               "every street, in both directions) or any (streets, houses, plants, traffic, "
               "materials and the lidar's flaws drawn by the seed, as for training)")
       .with_default();
-  command.option("--traffic", simulation.traffic,
-                 "Factor on everything that moves (0: an empty city), or a preset's name");
+  command
+      .option("--traffic", simulation.traffic,
+              "Factor on everything that moves in the preset's city; 0: nothing does")
+      .zero_to(10)
+      .with_default();
   command
       .option("--sensor", simulation.sensor,
               "hdl_64e (hdl64), hdl_32e, vlp_16 (vlp16) or a sensor file")
@@ -142,19 +164,7 @@ void add_simulate_command(CommandHandle program, Action& action) {
       .with_default();
   add_mount_option(command, simulation.mount,
                    "Not upright above the middle of its vehicle, but there");
-  command.flag("--imu", arguments->imu,
-               "Write imu.csv, too: an IMU at the lidar, 200 Hz, with noise and bias");
-  command
-      .option("--gnss", arguments->gnss_m,
-              "Write gnss.csv, too: an antenna at the lidar, 5 Hz, that errs by so many metres for "
-              "a minute, and by more beside houses (0.02: with corrections, 1.5: without)")
-      .above_zero();
-  command
-      .option(
-          "--gnss-delay", arguments->gnss_delay_s,
-          "Its stamps are so many seconds late, as of a receiver that stamps what it sends when "
-          "it sends it (0.1), or that has GPS time (18)")
-      .with_default();
+  add_recorded_beside(command, *arguments);
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"

@@ -193,12 +193,14 @@ void add_traversable_command(CommandHandle program, Action& action) {
                  "Folder for Nav2's map_server: map.yaml and map.pgm; made if need be");
   command.option("--picture", arguments->picture, "Draw the area and its reasons to FILE.png")
       .ends_in(".png");
-  command.option("--outlines", arguments->outlines,
-                 "Write the outlines of free areas, with holes, to FILE.json (as GeoJSON, in [m])");
+  const OptionHandle outlines = command.option(
+      "--outlines", arguments->outlines,
+      "Write the outlines of free areas, with holes, to FILE.json (as GeoJSON, in [m])");
   command
       .option("--min-outline-area", arguments->min_outline_area_m2,
               "Leave out smaller pieces of the outlines [m2]")
-      .with_default();
+      .with_default()
+      .needs(outlines);
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"
