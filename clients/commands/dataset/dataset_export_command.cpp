@@ -212,10 +212,7 @@ void add_dataset_export_command(CommandHandle dataset, Action& action) {
   add_recording_options(command, arguments->recording);
   command.option("OUT", arguments->out, "New folder for the sequence").required();
   add_mapper_options(command, arguments->mapper);
-  command.option("--start", arguments->range.first, "Number of the first scan");
-  command.option("--scans,--count", arguments->range.count, "Take as many scans at most");
-  command.flag("--strict", arguments->range.strict,
-               "Stop at the first damaged file instead of skipping it");
+  add_range_options(command, arguments->range);
   command.flag("--force", arguments->force,
                "Replace a sequence that is there already, with its labels");
   command.flag("--json", arguments->json, "Print JSON");

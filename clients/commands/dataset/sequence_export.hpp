@@ -3,14 +3,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "clients/commands/mapping/mapping_run.hpp"
+#include "clients/commands/arguments/scan_range.hpp"
 #include "core/dataset/kitti_sequence_writer.hpp"
 #include "core/lidar/prepare.hpp"
+#include "core/mapper.hpp"
 
 namespace stillmap::cli {
 

@@ -8,10 +8,11 @@
 
 #include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/arguments/mount_arguments.hpp"
+#include "clients/commands/arguments/scan_range.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/dataset/recording.hpp"
 #include "clients/commands/evaluate/segmentation_report.hpp"
-#include "clients/commands/mapping/mapping_run.hpp"
+#include "clients/commands/stage_stopwatch.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/table.hpp"

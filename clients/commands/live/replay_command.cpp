@@ -14,11 +14,11 @@
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/arguments/mount_arguments.hpp"
+#include "clients/commands/arguments/scan_range.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/dataset/recording.hpp"
 #include "clients/commands/live/replay_clock.hpp"
 #include "clients/commands/live/replay_poses.hpp"
-#include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
 #include "clients/commands/mapping/sample_feed.hpp"
 #include "clients/library/client.hpp"
@@ -426,11 +426,9 @@ void add_replay_command(CommandHandle program, Action& action) {
                "must be 'every')");
   command.option("--out,--output,-o", arguments->out,
                  "Write the poses that came back: KITTI 3x4, or with stamps to FILE.tum");
-  command.option("--start", replay.range.first, "Number of the first scan");
-  command.option("--scans,--count", replay.range.count, "Take as many scans at most");
+  add_range_options(command, replay.range);
   command.flag("--labels,!--no-labels", replay.with_labels,
                "Send the labels of the sequence, where it has any (default)");
-  command.flag("--strict", replay.range.strict, "Stop at the first damaged file");
   command.option("--topic", arguments->topic, "ROS 2 name of the topic")
       .corrected(to_topic_name)
       .with_default();

@@ -12,9 +12,9 @@
 
 #include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/arguments/mount_arguments.hpp"
+#include "clients/commands/arguments/scan_range.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/dataset/recording.hpp"
-#include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
@@ -311,11 +311,8 @@ void add_localize_command(CommandHandle program, Action& action) {
   add_mount_option(
       command, arguments->mount,
       "Poses of the robot, in a map that was made with the same --mount (or --config)");
-  command.option("--start", arguments->range.first, "Number of the first scan");
-  command.option("--scans,--count", arguments->range.count, "Look for as many scans at most");
+  add_range_options(command, arguments->range);
   command.option("--step", arguments->step, "Every so many scans").above_zero().with_default();
-  command.flag("--strict", arguments->range.strict,
-               "Stop at the first damaged file instead of skipping it");
   command
       .option("--picture", arguments->picture,
               "Draw the map, and a mark for each pose that was found, to FILE.png")

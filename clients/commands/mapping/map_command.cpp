@@ -94,18 +94,19 @@ void save_session(const std::filesystem::path& file, const EarlierMap& earlier,
                    .closures = result.session->alignment.closures.size()});
 }
 
-void save_map(const std::filesystem::path& file, const EarlierMap* earlier,
-              const MappingResult& result, const MapperConfig& config, const std::string& source) {
+void save_map(const std::filesystem::path& file, const MappingTask& task,
+              const MappingResult& result, const std::string& source) {
   SavedMap map{.view = *result.view,
                .tile_evidence = result.tile_evidence,
                .trajectory = result.trajectory,
-               .metadata = {{"sensor", config.sensor.name},
+               .metadata = {{"sensor", task.config.sensor.name},
                             {"label_source", result.label_source},
                             {"software", "stillmap " STILLMAP_VERSION},
                             {map_ended_key, "yes"}}};
   if (result.loops && result.loops->gnss && result.loops->gnss->datum)
     map.metadata["datum"] = to_text(*result.loops->gnss->datum);
-  if (earlier != nullptr) return save_session(file, *earlier, result, std::move(map), source);
+  if (task.earlier_map != nullptr)
+    return save_session(file, *task.earlier_map, result, std::move(map), source);
   open_map_file(file)->save(map);
   write_first_session(file, source);
 }
@@ -135,26 +136,26 @@ void write_loops(const std::filesystem::path& folder, const MappingResult& resul
 /// Writes poses_lidar.txt or poses_base.txt, poses_tum.txt, map.stillmap, map.ply, map.pcd, map.png
 /// and, with truth, trajectory.png and trajectory_error.png; what closed loops leave, where they
 /// were looked for. Throws what their writers throw.
-MapOutput write_map_output(const MapOutputFolder& out, const std::optional<Trajectory>& truth,
-                           const std::string& source, const EarlierMap* earlier,
-                           const MappingResult& result, const MapperConfig& config,
-                           const MappedBody& body) {
+MapOutput write_map_output(const MapOutputFolder& out, const MappingTask& task,
+                           const MappingResult& result, const std::string& source,
+                           const std::optional<Trajectory>& truth) {
   const std::filesystem::path& folder = out.unfinished();
+  const MappedBody& body = task.body;
   MapOutput output{.folder = out.path(),
                    .frame = body.frame,
-                   .sensor = config.sensor.name,
+                   .sensor = task.config.sensor.name,
                    .sensor_origin = {},
                    .recording_faults = {},
                    .accuracy = std::nullopt,
                    .odometry_accuracy = std::nullopt};
   write_kitti_poses(folder / pose_file_of(body.frame), result.trajectory);
   write_tum(folder / "poses_tum.txt", result.trajectory, body.frame);
-  save_map(out.new_map_file(), earlier, result, config, source);
+  save_map(out.new_map_file(), task, result, source);
   export_ply(*result.view, folder / "map.ply");
   export_pcd(*result.view, folder / "map.pcd");
   MapPictureOptions picture;
   picture.truth = truth_of(truth, result, body);
-  if (picture.truth && earlier != nullptr) {
+  if (picture.truth && task.earlier_map != nullptr) {
     for (StampedPose& pose : *picture.truth)
       pose.T_map_lidar = result.trajectory.front().T_map_lidar * pose.T_map_lidar;
   }
@@ -187,13 +188,11 @@ struct MapArguments {
   bool json = false;
 };
 
-MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& arguments,
-                                const MapperConfig& config, const MappedBody& body,
-                                std::unique_ptr<Segmenter> labels, RunFile& run_file,
-                                const std::optional<LoopOptions>& loops, const EarlierMap* earlier,
-                                StopSignal& stop) {
+MappingResult map_with_progress(const MappingTask& task, std::unique_ptr<Segmenter> labels,
+                                RunFile& run_file, StopSignal& stop) {
+  const ScanDataset& dataset = task.dataset;
   if (dataset.kitti_lidar()) std::cerr << "stillmap: " << dataset.kitti_lidar()->in_words() << "\n";
-  const std::size_t total = arguments.range.end(dataset) - arguments.range.first;
+  const std::size_t total = task.range.end(dataset) - task.range.first;
   Progress progress("map", "scans", total);
   std::size_t skipped = 0;
   const auto scan_done = [&](std::size_t seen) {
@@ -211,7 +210,7 @@ MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& 
     return !stop.requested();
   };
   return map_dataset(
-      dataset, arguments.range, config, body, std::move(labels), run_file, loops, earlier,
+      task, std::move(labels), run_file,
       {.scan_done = scan_done, .scan_skipped = scan_skipped, .scan_moved = scan_moved});
 }
 
@@ -275,6 +274,16 @@ GnssOptions gnss_options(const MapArguments& arguments, const ScanDataset& datas
   return options;
 }
 
+/// How loops are closed, but for the file of the scans, which is the output folder's; nothing where
+/// they are left open. Throws what denied_loops() and gnss_options() throw, then, too.
+std::optional<LoopOptions> loop_options(const MapArguments& arguments, const MappingTask& task) {
+  LoopOptions options{.scans_file = {},
+                      .max_range_m = task.config.static_map.max_range_m,
+                      .denied = denied_loops(arguments, task.dataset),
+                      .gnss = gnss_options(arguments, task.dataset, task.body)};
+  return arguments.loops == "on" ? std::optional(std::move(options)) : std::nullopt;
+}
+
 /// FNV-1a of a file's bytes, which tells one text from another.
 std::uint64_t digest_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -285,18 +294,18 @@ std::uint64_t digest_of(const std::filesystem::path& file) {
 }
 
 /// What makes the parts of a run one map.
-RunIdentity run_identity(const MapArguments& arguments, const ScanDataset& dataset,
-                         const MapperConfig& config, const MappedBody& body,
-                         const Segmenter& labels, const EarlierMap* earlier) {
-  const Eigen::Vector3d t = body.T_body_lidar.translation();
-  const Eigen::Quaterniond q(body.T_body_lidar.rotation());
+RunIdentity run_identity(const MapArguments& arguments, const MappingTask& task,
+                         const Segmenter& labels) {
+  const Eigen::Vector3d t = task.body.T_body_lidar.translation();
+  const Eigen::Quaterniond q(task.body.T_body_lidar.rotation());
   std::ostringstream settings;
-  settings << "sensor " << config.sensor.name << ", labels " << labels.name() << ", weighting "
-           << name(config.odometry.weighting) << ", voxels of " << config.static_map.voxel_size_m
-           << " m, lidar in " << body.frame << " at " << t.transpose() << " turned by "
-           << q.coeffs().transpose() << (arguments.loops == "on" ? ", loops closed" : "")
+  settings << "sensor " << task.config.sensor.name << ", labels " << labels.name() << ", weighting "
+           << name(task.config.odometry.weighting) << ", voxels of "
+           << task.config.static_map.voxel_size_m << " m, lidar in " << task.body.frame << " at "
+           << t.transpose() << " turned by " << q.coeffs().transpose()
+           << (arguments.loops == "on" ? ", loops closed" : "")
            << (arguments.gnss == "on" ? "" : ", without GNSS")
-           << (earlier == nullptr ? "" : ", onto " + earlier->identity());
+           << (task.earlier_map == nullptr ? "" : ", onto " + task.earlier_map->identity());
   const std::string& label_kind = arguments.recording.label_kind;
   if (!label_kind.empty()) settings << ", label kind " << label_kind;
   for (const double metres : arguments.antenna) settings << ", antenna " << metres;
@@ -305,25 +314,23 @@ RunIdentity run_identity(const MapArguments& arguments, const ScanDataset& datas
     settings << ", configuration of digest " << digest_of(arguments.mapper.config_file);
   // A bag's scans bear the name of their topic, whether or not the command line says it.
   const std::filesystem::path recording = std::filesystem::weakly_canonical(
-      dds::is_bag(arguments.dataset) ? dataset.file(arguments.range.first).parent_path()
+      dds::is_bag(arguments.dataset) ? task.dataset.file(task.range.first).parent_path()
                                      : std::filesystem::path(arguments.dataset));
-  return {recording.string() + " from scan " + std::to_string(arguments.range.first),
-          settings.str()};
+  return {recording.string() + " from scan " + std::to_string(task.range.first), settings.str()};
 }
 
-/// Maps what is left to map; the run's file is closed after that.
-MappingResult map_into(const MapOutputFolder& out, const ScanDataset& dataset,
-                       const MapArguments& arguments, const MapperConfig& config,
-                       const MappedBody& body, std::unique_ptr<Segmenter> labels,
-                       const EarlierMap* earlier, StopSignal& stop) {
-  RunFile run_file(out.run_file(), run_identity(arguments, dataset, config, body, *labels, earlier),
-                   std::chrono::duration<double>(arguments.save_period_s));
-  std::optional<LoopOptions> loops;
-  if (arguments.loops == "on")
-    loops = {out.kept_scans_file(), config.static_map.max_range_m, denied_loops(arguments, dataset),
-             gnss_options(arguments, dataset, body)};
-  return map_with_progress(dataset, arguments, config, body, std::move(labels), run_file, loops,
-                           earlier, stop);
+/// Maps what is left to map; the run's file is closed after that. What is not recognised leaves
+/// nothing to resume.
+MappingResult map_into(MapOutputFolder& out, const MapArguments& arguments, const MappingTask& task,
+                       std::unique_ptr<Segmenter> labels, StopSignal& stop) {
+  try {
+    RunFile run_file(out.run_file(), run_identity(arguments, task, *labels),
+                     std::chrono::duration<double>(arguments.save_period_s));
+    return map_with_progress(task, std::move(labels), run_file, stop);
+  } catch (const MapNotRecognized&) {
+    out.discard_run();
+    throw;
+  }
 }
 
 /// The map to go on in, where one is named. Throws what EarlierMap throws, and
@@ -343,19 +350,6 @@ std::unique_ptr<const EarlierMap> earlier_map(const MapArguments& arguments,
   return std::make_unique<const EarlierMap>(arguments.onto, config.static_map);
 }
 
-/// The same; what is not recognised leaves nothing to resume.
-MappingResult map_or_discard(MapOutputFolder& out, const ScanDataset& dataset,
-                             const MapArguments& arguments, const MapperConfig& config,
-                             const MappedBody& body, std::unique_ptr<Segmenter> labels,
-                             const EarlierMap* earlier, StopSignal& stop) {
-  try {
-    return map_into(out, dataset, arguments, config, body, std::move(labels), earlier, stop);
-  } catch (const MapNotRecognized&) {
-    out.discard_run();
-    throw;
-  }
-}
-
 ExitCode stopped_early(const MapOutputFolder& out, const std::string& what_is_there) {
   std::cerr << "stillmap: stopped early, as asked; " << what_is_there
             << "; 'stillmap map ... --out " << out.path().string() << " --resume' goes on\n";
@@ -367,20 +361,22 @@ ExitCode run(const MapArguments& arguments) {
   const dds::Recording recording = open_recording(
       arguments.dataset, arguments.recording, arguments.mapper.config_file, arguments.range.strict);
   const ScanDataset& dataset = recording.dataset;
-  const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
-  const MappedBody body = body_of(arguments.mount, arguments.mapper.config_file);
-  static_cast<void>(arguments.range.end(dataset));
-  static_cast<void>(denied_loops(arguments, dataset));
-  static_cast<void>(gnss_options(arguments, dataset, body));
+  MappingTask task{.dataset = dataset,
+                   .range = arguments.range,
+                   .config = mapper_config(arguments.mapper, dataset.suggested_sensor()),
+                   .body = body_of(arguments.mount, arguments.mapper.config_file)};
+  static_cast<void>(task.range.end(dataset));
+  task.loops = loop_options(arguments, task);
   const std::optional<Trajectory> truth = usable_truth(dataset);
-  auto labels = make_segmenter(arguments.mapper, dataset, body.T_body_lidar);
-  const std::unique_ptr<const EarlierMap> earlier = earlier_map(arguments, config);
-  std::cerr << describe_sensor_mismatch(dataset, config.sensor)
+  auto labels = make_segmenter(arguments.mapper, dataset, task.body.T_body_lidar);
+  const std::unique_ptr<const EarlierMap> earlier = earlier_map(arguments, task.config);
+  task.earlier_map = earlier.get();
+  std::cerr << describe_sensor_mismatch(dataset, task.config.sensor)
             << describe_model(arguments.mapper, dataset, *labels);
   // Nothing above touched the folder.
   MapOutputFolder out(arguments.out, arguments.policy);
-  const MappingResult result =
-      map_or_discard(out, dataset, arguments, config, body, std::move(labels), earlier.get(), stop);
+  if (task.loops) task.loops->scans_file = out.kept_scans_file();
+  const MappingResult result = map_into(out, arguments, task, std::move(labels), stop);
   if (result.stopped && out.had_map()) {
     return stopped_early(out, out.path().string() + " holds the map that it held before");
   }
@@ -394,8 +390,7 @@ ExitCode run(const MapArguments& arguments) {
         << "stillmap: loops are left open, since the sequence's stamps were set back and poses "
            "of before were dropped\n";
   }
-  MapOutput output =
-      write_map_output(out, truth, arguments.dataset, earlier.get(), result, config, body);
+  MapOutput output = write_map_output(out, task, result, arguments.dataset, truth);
   output.sensor_origin = sensor_origin(arguments.mapper);
   output.recording_faults = recording.faults;
   const Json report = to_json(result, output);
@@ -407,9 +402,34 @@ ExitCode run(const MapArguments& arguments) {
                                 std::string(arguments.loops == "on" ? ", loops open" : ""));
 }
 
-}  // namespace
+void add_output_options(CommandHandle command, MapArguments& arguments) {
+  constexpr int seconds_of_a_year = 365 * 86400;
+  command.option("--out,--output,-o", arguments.out, "Folder for the results").with_default();
+  command.flag("--force", arguments.policy.force,
+               "Replace results that are there already, once the new ones are complete");
+  command.flag("--resume", arguments.policy.resume,
+               "Go on with the run that was stopped or killed in this folder");
+  command
+      .option("--save-period", arguments.save_period_s,
+              "Seconds between saves of the run, for --resume")
+      .with_default()
+      .above_zero_to(seconds_of_a_year);
+  command.flag("--json", arguments.json, "Print report.json instead of the summary");
+}
 
-void add_gnss_options(CommandHandle command, MapArguments& arguments) {
+void add_loop_options(CommandHandle command, MapArguments& arguments) {
+  command
+      .option("--loops", arguments.loops,
+              "on: where the drive comes back to a place, poses and map are corrected; off: as "
+              "odometry has them")
+      .one_of({"on", "off"})
+      .with_default();
+  command.option("--deny-loop", arguments.denied_loops,
+                 "FROM:TO, a closure that is wrong, as 'stillmap loops' lists it: nothing joins "
+                 "these places again; may be given several times");
+  command.option("--onto", arguments.onto,
+                 "A map made earlier: the drive goes on in a copy of it, as another session, where "
+                 "it is recognised; this file is only read");
   command
       .option("--gnss", arguments.gnss,
               "on: fixes of a receiver beside the scans (gnss.csv, a bag's only NavSatFix) say "
@@ -424,14 +444,7 @@ void add_gnss_options(CommandHandle command, MapArguments& arguments) {
       .comma_separated();
 }
 
-void add_save_option(CommandHandle command, MapArguments& arguments) {
-  constexpr int seconds_of_a_year = 365 * 86400;
-  command
-      .option("--save-period", arguments.save_period_s,
-              "Seconds between saves of the run, for --resume")
-      .with_default()
-      .above_zero_to(seconds_of_a_year);
-}
+}  // namespace
 
 void add_map_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<MapArguments>();
@@ -439,33 +452,12 @@ void add_map_command(CommandHandle program, Action& action) {
       "map", "Map a sequence or bag in this process: the server's mapper without DDS");
   command.option("DATASET", arguments->dataset, dataset_kinds).required();
   add_recording_options(command, arguments->recording);
-  command.option("--out,--output,-o", arguments->out, "Folder for the results").with_default();
   add_mapper_options(command, arguments->mapper);
   add_mount_option(command, arguments->mount,
                    "Poses of the robot, and the map from where it stands, as a server has them");
-  command.option("--start", arguments->range.first, "Number of the first scan");
-  command.option("--scans,--count", arguments->range.count, "Take as many scans at most");
-  command.flag("--strict", arguments->range.strict,
-               "Stop at the first damaged file instead of skipping it");
-  command.flag("--force", arguments->policy.force,
-               "Replace results that are there already, once the new ones are complete");
-  command.flag("--resume", arguments->policy.resume,
-               "Go on with the run that was stopped or killed in this folder");
-  command
-      .option("--loops", arguments->loops,
-              "on: where the drive comes back to a place, poses and map are corrected; off: as "
-              "odometry has them")
-      .one_of({"on", "off"})
-      .with_default();
-  command.option("--deny-loop", arguments->denied_loops,
-                 "FROM:TO, a closure that is wrong, as 'stillmap loops' lists it: nothing joins "
-                 "these places again; may be given several times");
-  command.option("--onto", arguments->onto,
-                 "A map made earlier: the drive goes on in a copy of it, as another session, where "
-                 "it is recognised; this file is only read");
-  add_gnss_options(command, *arguments);
-  add_save_option(command, *arguments);
-  command.flag("--json", arguments->json, "Print report.json instead of the summary");
+  add_range_options(command, arguments->range);
+  add_loop_options(command, *arguments);
+  add_output_options(command, *arguments);
   command.explain(
       "Examples:\n"
       "  stillmap map sequences/00 --out kitti00 --scans 500\n"

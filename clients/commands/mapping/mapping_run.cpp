@@ -29,26 +29,20 @@ std::vector<std::uint16_t> true_ids_of_kept_points(const DatasetFrame& frame,
 /// One run over a data set: keeps what is reported at its end.
 class MappingRun {
  public:
-  MappingRun(const ScanDataset& dataset, bool strict, const MapperConfig& config,
-             const MappedBody& body, std::unique_ptr<Segmenter> labels,
-             const std::optional<LoopOptions>& loops, const EarlierMap* earlier_map,
+  MappingRun(const MappingTask& task, std::unique_ptr<Segmenter> labels,
              const MappingListeners& listeners)
-      : dataset_(dataset),
-        strict_(strict),
-        earlier_map_(earlier_map),
+      : task_(task),
         listeners_(listeners),
-        T_body_lidar_(body.T_body_lidar),
-        prepare_(config.prepare),
-        scans_(dataset, config, std::move(labels)),
-        mapper_(config, scans_.segmenter(),
+        T_body_lidar_(task.body.T_body_lidar),
+        scans_(task.dataset, task.config, std::move(labels)),
+        mapper_(task.config, scans_.segmenter(),
                 {.stage_ended = [this](std::string_view stage) { times_.end_stage(stage); },
                  .pose_found = {}}),
-        imu_(dataset.imu()),
-        period_s_(config.sensor.period_s) {
+        imu_(task.dataset.imu()) {
     mapper_.reset(new_map_id());
     if (!T_body_lidar_.isApprox(Eigen::Isometry3d::Identity()))
       mapper_.begin_maps_at(T_body_lidar_);
-    if (loops) loops_.emplace(*loops, config.sensor);
+    if (task.loops) loops_.emplace(*task.loops, task.config.sensor);
   }
 
   /// Goes on where an earlier run was. Throws std::invalid_argument for another voxel size.
@@ -82,8 +76,10 @@ class MappingRun {
   void map_scan(std::size_t index) {
     std::optional<DatasetFrame> frame = read(index);
     if (!frame) return;
-    const std::vector<std::uint16_t> true_ids = true_ids_of_kept_points(*frame, prepare_);
-    for (const ImuSample& sample : imu_.take_up_to_end_of(frame->scan, period_s_))
+    const std::vector<std::uint16_t> true_ids =
+        true_ids_of_kept_points(*frame, task_.config.prepare);
+    for (const ImuSample& sample :
+         imu_.take_up_to_end_of(frame->scan, task_.config.sensor.period_s))
       mapper_.add(sample);
     times_.begin();
     std::optional<Eigen::Isometry3d> T_map_lidar_first;
@@ -95,7 +91,7 @@ class MappingRun {
         mapper_.process(std::move(frame->scan), T_map_lidar_first);
     if (!mapped) {
       skip({index, mapper_.last_rejection().counter,
-            dataset_.file(index).string() + ": " + mapper_.last_rejection().reason});
+            task_.dataset.file(index).string() + ": " + mapper_.last_rejection().reason});
       return;
     }
     times_.end();
@@ -114,13 +110,13 @@ class MappingRun {
     const bool has_all_scans = loops_ && loops_->scan_count() == result_.trajectory.size();
     if (has_all_scans && !stopped) {
       const bool has_loops = loops_->finish();
-      if (earlier_map_ != nullptr) {
+      if (task_.earlier_map != nullptr) {
         stopped = !put_onto_earlier_map();
       } else if (has_loops) {
         stopped = !correct();
       }
       if (!stopped) result_.loops = loops_->report();
-    } else if (earlier_map_ != nullptr && !stopped) {
+    } else if (task_.earlier_map != nullptr && !stopped) {
       throw std::invalid_argument(
           "the sequence's stamps were set back, and poses of before were dropped: it cannot be put "
           "onto a map in one piece; map it from the scan on where they are (--start)");
@@ -159,19 +155,20 @@ class MappingRun {
   /// Throws MapNotRecognized.
   [[nodiscard]] bool put_onto_earlier_map() {
     const auto began = std::chrono::steady_clock::now();
+    const EarlierMap& earlier_map = *task_.earlier_map;
     SessionReport session;
-    session.alignment = loops_->align(earlier_map_->index(), T_body_lidar_.linear());
+    session.alignment = loops_->align(earlier_map.index(), T_body_lidar_.linear());
     if (!session.alignment.is_recognized()) {
       throw MapNotRecognized(
-          "the drive was not recognised in " + earlier_map_->file().string() + ": " +
+          "the drive was not recognised in " + earlier_map.file().string() + ": " +
           session.alignment.in_words() +
           "; nothing was written. Where it is of another place, map it by itself, without --onto; "
           "else it must come through the mapped place for some 50 m");
     }
     if (!result_.trajectory.empty())
-      session.clock_offset_ns = earlier_map_->clock_offset_ns(result_.trajectory.front().stamp_ns);
+      session.clock_offset_ns = earlier_map.clock_offset_ns(result_.trajectory.front().stamp_ns);
     StaticMap map(mapper_.static_map().config());
-    map.resume(earlier_map_->saved().view, earlier_map_->saved().tile_evidence);
+    map.resume(earlier_map.saved().view, earlier_map.saved().tile_evidence);
     map.begin_session();
     if (!move_scans(session.alignment.T_map_lidar, session.clock_offset_ns, std::move(map)))
       return false;
@@ -211,7 +208,7 @@ class MappingRun {
     try {
       return scans_.read();
     } catch (const DatasetError& error) {
-      if (strict_) throw;
+      if (task_.range.strict) throw;
       skip({index, "unreadable", error.what()});
       return std::nullopt;
     }
@@ -222,18 +219,14 @@ class MappingRun {
     result_.skipped.push_back(std::move(scan));
   }
 
-  const ScanDataset& dataset_;
-  bool strict_;
-  const EarlierMap* earlier_map_;
+  const MappingTask& task_;
   const MappingListeners& listeners_;
   Eigen::Isometry3d T_body_lidar_;
-  PrepareConfig prepare_;
   StageStopwatch times_;
   ScansAhead scans_;
   Mapper mapper_;
   std::optional<LoopCorrection> loops_;
   SampleFeed<ImuSample> imu_;
-  double period_s_;
   Trajectory earlier_;
   bool is_registered_ = false;
   std::uint64_t step_ = 0;
@@ -252,27 +245,12 @@ void check_resumed(std::size_t next_scan, const ScanRange& range, std::size_t en
 
 }  // namespace
 
-std::size_t ScanRange::end(const ScanDataset& dataset) const {
-  const std::size_t scans = dataset.size();
-  if (scans == 0) throw std::invalid_argument("the data set has no scan");
-  if (first >= scans) {
-    throw std::invalid_argument("the data set has " + std::to_string(scans) + " scans, 0 to " +
-                                std::to_string(scans - 1) + "; --start is " +
-                                std::to_string(first));
-  }
-  if (count == 0) throw std::invalid_argument("--scans 0 asks for no scan; 1 is the least");
-  return first + std::min(count, dataset.size() - first);
-}
-
-MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
-                          const MapperConfig& config, const MappedBody& body,
-                          std::unique_ptr<Segmenter> labels, RunFile& run_file,
-                          const std::optional<LoopOptions>& loops, const EarlierMap* earlier_map,
-                          const MappingListeners& listeners) {
-  const std::size_t end = range.end(dataset);
+MappingResult map_dataset(const MappingTask& task, std::unique_ptr<Segmenter> labels,
+                          RunFile& run_file, const MappingListeners& listeners) {
+  const ScanRange& range = task.range;
+  const std::size_t end = range.end(task.dataset);
   std::size_t index = range.first;
-  MappingRun run(dataset, range.strict, config, body, std::move(labels), loops, earlier_map,
-                 listeners);
+  MappingRun run(task, std::move(labels), listeners);
   // The map of a few scans is too thin to be found in, and soon made again.
   constexpr std::size_t min_resumed_scans = 10;
   if (auto earlier = run_file.earlier();
@@ -290,7 +268,7 @@ MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
     run.map_scan(index++);
     is_stopped = listeners.scan_done && !listeners.scan_done(index - range.first) && index < end;
     // At the end, too, where loops are closed next: that may take minutes, and be stopped.
-    const bool is_before_correction = index == end && loops.has_value();
+    const bool is_before_correction = index == end && task.loops.has_value();
     if (!is_before_correction && (index == end || !(is_stopped || run_file.is_due()))) continue;
     run_file.save(run.state(index));
     run.state_saved();

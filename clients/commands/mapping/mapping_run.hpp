@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "clients/commands/arguments/mount_arguments.hpp"
+#include "clients/commands/arguments/scan_range.hpp"
 #include "clients/commands/mapping/earlier_map.hpp"
 #include "clients/commands/mapping/loop_correction.hpp"
 #include "clients/commands/mapping/run_file.hpp"
@@ -19,25 +19,6 @@
 #include "core/mapper.hpp"
 
 namespace stillmap::cli {
-
-/// Which scans of a data set, and what to do about damaged ones.
-struct ScanRange {
-  std::size_t first = 0;
-  /// As many as this, or as there are.
-  std::size_t count = SIZE_MAX;
-  /// A damaged file ends the run instead of being skipped.
-  bool strict = false;
-
-  /// One past the last scan. Throws std::invalid_argument when no scan is in the range.
-  [[nodiscard]] std::size_t end(const ScanDataset& dataset) const;
-};
-
-/// A scan that was skipped, and why.
-struct SkippedScan {
-  std::size_t index = 0;
-  std::string counter;
-  std::string reason;
-};
 
 struct MappingResult {
   /// Of the body; corrected where loops were closed.
@@ -72,10 +53,17 @@ struct MappingResult {
   bool stopped = false;
 };
 
-/// Called after every scan with the number of scans seen; returning false ends the run.
-using ScanDone = std::function<bool(std::size_t seen)>;
-/// Called for every scan that is skipped.
-using ScanSkipped = std::function<void(const SkippedScan&)>;
+/// What is mapped, and how.
+struct MappingTask {
+  const ScanDataset& dataset;
+  ScanRange range;
+  MapperConfig config;
+  MappedBody body;
+  /// Nothing: loops stay open.
+  std::optional<LoopOptions> loops = std::nullopt;
+  /// The map that the drive is put onto by closing loops; may be null.
+  const EarlierMap* earlier_map = nullptr;
+};
 
 /// Whom a run tells how far it is; each may be empty.
 struct MappingListeners {
@@ -88,14 +76,10 @@ struct MappingListeners {
 
 /// Maps a data set in this process. The run goes on from what `run_file` holds, and its state is
 /// saved there from time to time; what is reported of scans, but poses and map, is of the resumed
-/// part alone. With `loops`, these are closed: poses and map are corrected when all scans are
-/// mapped. With an `earlier` map, too, the drive is put onto it. What was stopped has poses and map
-/// as odometry made them. Throws what reading and saving throw, and MapNotRecognized.
-[[nodiscard]] MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
-                                        const MapperConfig& config, const MappedBody& body,
-                                        std::unique_ptr<Segmenter> labels, RunFile& run_file,
-                                        const std::optional<LoopOptions>& loops,
-                                        const EarlierMap* earlier = nullptr,
-                                        const MappingListeners& listeners = {});
+/// part alone. Loops are closed when all scans are mapped: poses and map are corrected then. What
+/// was stopped has poses and map as odometry made them. Throws what reading and saving throw, and
+/// MapNotRecognized.
+[[nodiscard]] MappingResult map_dataset(const MappingTask& task, std::unique_ptr<Segmenter> labels,
+                                        RunFile& run_file, const MappingListeners& listeners);
 
 }  // namespace stillmap::cli
