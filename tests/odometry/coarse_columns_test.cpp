@@ -6,10 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/odometry/odometry.hpp"
 #include "core/odometry/ring_order.hpp"
-#include "tests/odometry/box_world.hpp"
-#include "tests/odometry/register_scan.hpp"
+#include "tests/odometry/unlabelled_drive.hpp"
 
 namespace stillmap::test {
 namespace {
@@ -58,28 +56,16 @@ TEST(RayStep, IsThatOfTheRaysWhateverReturns) {
 
 class CoarseColumns : public testing::TestWithParam<CoarseLidar> {};
 
-/// From columns 0.81 degrees apart on every surface was a grazed one, and no scan could begin a
-/// map; a flat wall seen at an angle was an edge long before.
+/// Between columns 0.81 degrees apart every surface may be a grazed one, of which no scan begins a
+/// map, and a flat wall seen at an angle an edge.
 TEST_P(CoarseColumns, ALidarThatSetsOffInAStreetIsFollowed) {
-  const BoxWorld world = street();
-  const SensorModel sensor = GetParam().sensor();
-  OdometryConfig config;
-  config.weighting = Weighting::geometric;
-  Odometry odometry(config, sensor);
-  double x_m = 0.0;
-  for (int k = 0; k < 30; ++k) {
-    x_m += 0.1 * GetParam().speed_m_s * std::min(1.0, 0.1 * k);
-    Scan scan =
-        world.scan(sensor, Eigen::Isometry3d(Eigen::Translation3d(x_m, 0.0, 0.0)), 0.1 * k).scan;
-    scan.labels.clear();
-    const OdometryResult result = register_scan(odometry, std::move(scan), {}).result;
-    ASSERT_NE(result.health, OdometryHealth::lost) << "scan " << k;
-    EXPECT_NEAR(result.T_map_lidar.translation().x(), x_m, 0.05) << "scan " << k;
-  }
+  const auto T_world_lidar = [](int k) { return setting_off(k, GetParam().speed_m_s); };
+  follow_unlabelled(
+      street(), GetParam().sensor(), 30, T_world_lidar,
+      [](const Eigen::Isometry3d& off) { EXPECT_NEAR(off.translation().x(), 0.0, 0.05); });
 }
 
-/// Columns on smooth walls go along with the lidar: without the rings' directions in a map's first
-/// scans, dense lidars were held to stand to the end, `good`.
+/// Columns on smooth walls go along with the lidar: only the rings' directions tell that it drives.
 INSTANTIATE_TEST_SUITE_P(DenseLidars, CoarseColumns,
                          testing::Values(CoarseLidar{.rings = 48, .columns = 360, .speed_m_s = 8.0},
                                          CoarseLidar{.rings = 48, .columns = 512, .speed_m_s = 1.0},
