@@ -2,11 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <vector>
 
-#include "core/map/static_map.hpp"
-#include "core/map/storage/map_file.hpp"
 #include "core/session/map_alignment.hpp"
 #include "tests/graph/level_worlds.hpp"
 #include "tests/session/street_maps.hpp"
@@ -17,18 +14,8 @@ namespace {
 using Poses = std::vector<Eigen::Isometry3d>;
 
 SavedMap map_of(const levels::BoxWorld& world, const Poses& poses) {
-  StaticMap map{StaticMapConfig{}};
-  map.reset(1);
-  Trajectory path;
-  for (std::size_t k = 0; k < poses.size(); ++k) {
-    LabelledScan scan = world.scan_at(poses[k], k + 1);
-    scan.scan.stamp_ns = static_cast<std::int64_t>(k + 1) * 1'000'000'000;
-    map.insert(scan, poses[k]);
-    path.push_back({scan.scan.stamp_ns, poses[k]});
-  }
-  SavedMap saved = to_saved_map(map.checkpoint(CheckpointScope::everything));
-  saved.trajectory = path;
-  return saved;
+  return map_of_scans(
+      poses, [&](std::size_t k) { return world.scan_at(poses[k], k + 1); }, 1);
 }
 
 /// By odometry without drift.
