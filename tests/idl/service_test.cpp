@@ -59,21 +59,23 @@ TEST(Service, AnswersEachClientWithItsOwnReply) {
 
 TEST(Service, CountsRequestsThatItHadNoRoomFor) {
   Participant server_side(loopback(false));
-  std::promise<void> all_sent;
-  const Server server(server_side, "stillmap/save_map",
-                      [sent = all_sent.get_future().share()](const SaveMap_Request& request) {
-                        sent.wait();
-                        return echo(request);
-                      });
+  std::promise<void> all_arrived;
+  std::atomic<bool> is_answering = false;
+  const Server server(
+      server_side, "stillmap/save_map",
+      [&is_answering, arrived = all_arrived.get_future().share()](const SaveMap_Request& request) {
+        is_answering = true;
+        arrived.wait();
+        return echo(request);
+      });
   Participant client_side(loopback(false));
   Writer<SaveMap_Request> requests(client_side, "rq/stillmap/save_mapRequest", {.depth = 500});
   ASSERT_TRUE(requests.readers().wait_for_any(discovery_timeout));
   ASSERT_TRUE(requests.write(request_for("")));
-  // It is being answered.
-  std::this_thread::sleep_for(500ms);
+  ASSERT_TRUE(test::eventually([&] { return is_answering.load(); }, discovery_timeout, 5ms));
   for (int i = 0; i < 300; ++i) ASSERT_TRUE(requests.write(request_for("")));
-  std::this_thread::sleep_for(500ms);
-  all_sent.set_value();
+  ASSERT_TRUE(requests.wait_for_acknowledgements(discovery_timeout));
+  all_arrived.set_value();
   const auto lost = [&] {
     return server_side.service_faults().count("lost_request", "stillmap/save_map");
   };
