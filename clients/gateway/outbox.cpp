@@ -101,12 +101,6 @@ std::optional<Outbox::Item> Outbox::next(bool large_too) {
   return answers_.empty() ? std::nullopt : next_answer();
 }
 
-bool Outbox::has_large() const {
-  return !answers_.empty() || std::ranges::any_of(queues_, [](const auto& entry) {
-    return !entry.second.order.empty();
-  });
-}
-
 bool Outbox::is_small(const Item& item) const {
   if (const auto* const data = std::get_if<Data>(&item)) {
     return is_small_size(data->message->bytes.size());

@@ -54,9 +54,6 @@ class Outbox {
   /// The next to be sent: texts, then small messages and answers, subscriptions in turn, then, with
   /// `large_too`, large ones. Nothing when nothing of these waits.
   [[nodiscard]] std::optional<Item> next(bool large_too);
-  /// Whether something waits that only `large_too` would give.
-  [[nodiscard]] bool has_large() const;
-
   [[nodiscard]] bool is_small(const Item& item) const;
   [[nodiscard]] const std::map<std::uint32_t, Counters>& counters() const { return counters_; }
   [[nodiscard]] std::size_t waiting_bytes() const;
