@@ -1,5 +1,7 @@
 #include "core/frames/rigid_motion.hpp"
 
+#include <cmath>
+
 #include "core/odometry/se3.hpp"
 
 namespace stillmap {
@@ -10,6 +12,10 @@ Eigen::Isometry3d from_xyz_rpy(const Eigen::Vector3d& translation_m,
          (Eigen::AngleAxisd(roll_pitch_yaw.z(), Eigen::Vector3d::UnitZ()) *
           Eigen::AngleAxisd(roll_pitch_yaw.y(), Eigen::Vector3d::UnitY()) *
           Eigen::AngleAxisd(roll_pitch_yaw.x(), Eigen::Vector3d::UnitX()));
+}
+
+double heading_rad(const Eigen::Isometry3d& T_parent_child) {
+  return std::atan2(T_parent_child.linear()(1, 0), T_parent_child.linear()(0, 0));
 }
 
 Eigen::Matrix3d levelling_rotation(const Eigen::Vector3d& up_body) {

@@ -9,6 +9,9 @@ namespace stillmap {
 [[nodiscard]] Eigen::Isometry3d from_xyz_rpy(const Eigen::Vector3d& translation_m,
                                              const Eigen::Vector3d& roll_pitch_yaw);
 
+/// Where the child's x axis points, seen from above: from the parent's x towards its y [rad].
+[[nodiscard]] double heading_rad(const Eigen::Isometry3d& T_parent_child);
+
 /// R_level_body: the least turn that has `up_body`, a unit vector, point along z.
 [[nodiscard]] Eigen::Matrix3d levelling_rotation(const Eigen::Vector3d& up_body);
 

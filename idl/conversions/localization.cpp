@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/frames/rigid_motion.hpp"
 #include "core/map/voxel_grid.hpp"
 #include "idl/conversions/pose.hpp"
 #include "idl/interface/topics.hpp"
@@ -35,10 +36,6 @@ void require(bool holds, const char* field, double value, const std::string& mus
   std::ostringstream text;
   text << field << " is " << value << ": it must be " << must;
   throw std::invalid_argument(text.str());
-}
-
-double heading_rad(const Eigen::Isometry3d& T) {
-  return std::atan2(T.linear()(1, 0), T.linear()(0, 0));
 }
 
 bool is_on_map(double coordinate_m) {

@@ -26,6 +26,15 @@ TEST(FromXyzRpy, TurnsAboutFixedAxesRollFirst) {
   EXPECT_TRUE((T.linear() * Eigen::Vector3d::UnitX()).isApprox(Eigen::Vector3d::UnitY(), 1e-12));
 }
 
+TEST(Heading, IsTheTurnAboutTheVerticalOfWhatDoesNotLean) {
+  for (const double yaw : {-3.0, -0.4, 0.0, 1.2, 3.1})
+    EXPECT_NEAR(heading_rad(from_xyz_rpy({1.0, 2.0, 3.0}, {0.0, 0.0, yaw})), yaw, 1e-12);
+}
+
+TEST(Heading, IsThatOfTheNoseHoweverItIsHeld) {
+  EXPECT_NEAR(heading_rad(from_xyz_rpy({0.0, 0.0, 0.0}, {0.3, -0.2, 1.2})), 1.2, 1e-12);
+}
+
 TEST(MotionOfFrame, SwingsALidarAheadOfATurningBase) {
   const Eigen::Isometry3d T_base_lidar = from_xyz_rpy({1.0, 0.0, 0.0}, {0.0, 0.0, 0.0});
   const Eigen::Isometry3d turn = from_xyz_rpy({0.0, 0.0, 0.0}, {0.0, 0.0, right_angle});

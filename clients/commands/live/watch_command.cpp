@@ -1,11 +1,9 @@
-#include <cmath>
 #include <deque>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <memory>
 #include <mutex>
-#include <numbers>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -13,6 +11,7 @@
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
+#include "clients/commands/pose_report.hpp"
 #include "clients/commands/server_control/status_report.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/stop_signal.hpp"
@@ -57,11 +56,7 @@ class UpdateQueue {
   std::optional<dds::ServerStatus> status_;
 };
 
-double yaw_deg(const Eigen::Isometry3d& T) {
-  return std::atan2(T.linear()(1, 0), T.linear()(0, 0)) * 180.0 / std::numbers::pi;
-}
-
-Json pose_json(const OdometryUpdate& update) {
+Json update_json(const OdometryUpdate& update) {
   const StampedPose& pose = update.pose;
   const Eigen::Vector3d t = pose.T_map_lidar.translation();
   const Eigen::Quaterniond q(pose.T_map_lidar.linear());
@@ -80,7 +75,7 @@ std::string status_line(const dds::ServerStatus& status, const std::optional<Sta
   } else {
     const Eigen::Isometry3d& T = newest->T_map_lidar;
     line = "x " + fixed(T.translation().x(), 2) + "  y " + fixed(T.translation().y(), 2) + "  z " +
-           fixed(T.translation().z(), 2) + " m  yaw " + fixed(yaw_deg(T), 1) + " deg";
+           fixed(T.translation().z(), 2) + " m  yaw " + fixed(heading_deg(T), 1) + " deg";
   }
   line += "  " + std::string(name(status.health)) + "  in " + fixed(status.received_hz, 1) +
           "/s  mapped " + fixed(status.mapped_hz, 1) + "/s  dropped " +
@@ -100,7 +95,7 @@ class Watch {
       newest_ = update.pose;
       if (!arguments_.out.empty()) poses_.push_back(update.pose);
       frame_ = update.child_frame;
-      if (arguments_.json) std::cout << pose_json(update).dump() << "\n";
+      if (arguments_.json) std::cout << update_json(update).dump() << "\n";
     }
     if (const std::optional<dds::ServerStatus> status = updates.take_status()) {
       if (arguments_.json) {

@@ -1,9 +1,7 @@
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <iostream>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -15,6 +13,7 @@
 #include "clients/commands/arguments/scan_range.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/dataset/recording.hpp"
+#include "clients/commands/pose_report.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
@@ -160,18 +159,9 @@ class LocalizationRun {
 };
 
 Json place_json(const Eigen::Isometry3d& T) {
-  const Eigen::Quaterniond q(T.rotation());
-  const Eigen::Vector3d t = T.translation();
-  Json rows = Json::array();
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 4; ++column) rows.push_back(T.matrix()(row, column));
-  return {{"position", {t.x(), t.y(), t.z()}},
-          {"orientation_xyzw", {q.x(), q.y(), q.z(), q.w()}},
-          {"matrix_3x4", rows}};
-}
-
-double heading_deg(const Eigen::Isometry3d& T) {
-  return std::atan2(T.linear()(1, 0), T.linear()(0, 0)) * 180.0 / std::numbers::pi;
+  Json json = pose_json(T);
+  json.set("matrix_3x4", rows_json(T));
+  return json;
 }
 
 double score_of(const LocalizationResult& result, std::size_t place) {

@@ -4,8 +4,10 @@
 
 #include <fstream>
 #include <numbers>
+#include <utility>
 #include <vector>
 
+#include "clients/commands/pose_report.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/dataset/dataset_error.hpp"
 
@@ -55,22 +57,25 @@ std::string describe_stages(const std::vector<StageDurations>& stages) {
   return table.text();
 }
 
+/// What both kinds of closures have; the rest is added.
+template <typename Closure>
+Json closure_json(const Closure& closure) {
+  return {{"score", closure.upright_fit},
+          {"fit", closure.fit},
+          {"overlap", closure.overlap},
+          {"runner_up", closure.runner_up},
+          {"jump_m", closure.jump_m},
+          {"refusal", closure.refusal.empty() ? Json(nullptr) : Json(closure.refusal)}};
+}
+
 Json closures_json(const std::vector<LoopClosure>& closures) {
   Json json = Json::array();
   for (const LoopClosure& closure : closures) {
-    Json transform = Json::array();
-    for (int row = 0; row < 3; ++row)
-      for (int column = 0; column < 4; ++column)
-        transform.push_back(closure.T_from_to(row, column));
-    json.push_back({{"from_scan", closure.from_scan},
-                    {"to_scan", closure.to_scan},
-                    {"T_from_to", transform},
-                    {"score", closure.upright_fit},
-                    {"fit", closure.fit},
-                    {"overlap", closure.overlap},
-                    {"runner_up", closure.runner_up},
-                    {"jump_m", closure.jump_m},
-                    {"refusal", closure.refusal.empty() ? Json(nullptr) : Json(closure.refusal)}});
+    Json row = closure_json(closure);
+    row.set("from_scan", closure.from_scan);
+    row.set("to_scan", closure.to_scan);
+    row.set("T_from_to", rows_json(closure.T_from_to));
+    json.push_back(std::move(row));
   }
   return json;
 }
@@ -78,18 +83,10 @@ Json closures_json(const std::vector<LoopClosure>& closures) {
 Json map_closures_json(const std::vector<MapClosure>& closures) {
   Json json = Json::array();
   for (const MapClosure& closure : closures) {
-    Json transform = Json::array();
-    for (int row = 0; row < 3; ++row)
-      for (int column = 0; column < 4; ++column)
-        transform.push_back(closure.T_map_lidar(row, column));
-    json.push_back({{"scan", closure.scan},
-                    {"T_map_lidar", transform},
-                    {"score", closure.upright_fit},
-                    {"fit", closure.fit},
-                    {"overlap", closure.overlap},
-                    {"runner_up", closure.runner_up},
-                    {"jump_m", closure.jump_m},
-                    {"refusal", closure.refusal.empty() ? Json(nullptr) : Json(closure.refusal)}});
+    Json row = closure_json(closure);
+    row.set("scan", closure.scan);
+    row.set("T_map_lidar", rows_json(closure.T_map_lidar));
+    json.push_back(std::move(row));
   }
   return json;
 }

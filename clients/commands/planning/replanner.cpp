@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "clients/commands/query/fetch_map.hpp"
+#include "core/frames/rigid_motion.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -67,8 +68,7 @@ void RobotPoseSubscription::set(const StampedPose& pose) {
 Goal RobotPoseSubscription::pose() const {
   const std::lock_guard lock(mutex_);
   const Eigen::Isometry3d& T = newest_.T_map_lidar;
-  return {T.translation().head<2>(), std::atan2(T.linear()(1, 0), T.linear()(0, 0)),
-          T.translation().z()};
+  return {T.translation().head<2>(), heading_rad(T), T.translation().z()};
 }
 
 }  // namespace stillmap::cli

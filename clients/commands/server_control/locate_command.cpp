@@ -9,6 +9,7 @@
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/commands/pose_report.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
 
@@ -38,19 +39,11 @@ LocalizationQuestion question_of(const LocateArguments& arguments) {
   return question;
 }
 
-double heading_deg(const Eigen::Isometry3d& T) {
-  return std::atan2(T.linear()(1, 0), T.linear()(0, 0)) / rad_per_deg;
-}
-
 Json to_json(const LocalizationAnswer& answer) {
-  const Eigen::Vector3d p = answer.T_map_base.translation();
-  const Eigen::Quaterniond q(answer.T_map_base.rotation());
   const bool is_found = answer.outcome == LocalizationStatus::found;
   return {{"outcome", name(answer.outcome)},
           {"stamp_ns", answer.stamp_ns},
-          {"pose", is_found ? Json{{"position", {p.x(), p.y(), p.z()}},
-                                   {"orientation_xyzw", {q.x(), q.y(), q.z(), q.w()}}}
-                            : Json(nullptr)},
+          {"pose", is_found ? pose_json(answer.T_map_base) : Json(nullptr)},
           {"score", answer.score},
           {"runner_up_score", answer.runner_up_score},
           {"ms", answer.milliseconds},
