@@ -6,7 +6,7 @@
 # crashed, leaked, ran out of memory, or took more than INPUT_SECONDS (10) for one input: more is
 # needed only where the machine is busy with other things.
 set -u -o pipefail
-seconds=$1; shift
+seconds=${1:?usage: tests/fuzz/fuzz.sh SECONDS [TARGET...]}; shift
 here=$(cd "$(dirname "$0")" && pwd)
 root=$here/../..
 programs=$root/build/fuzz/fuzz
@@ -24,7 +24,7 @@ if [ -z "${STILLMAP_FUZZ_BUILT:-}" ]; then
 fi
 targets=("$@")
 if [ ${#targets[@]} = 0 ]; then
-  targets=($(sed -n 's/^fuzz_target(\([a-z_]*\).*/\1/p' "$here/CMakeLists.txt"))
+  mapfile -t targets < <(sed -n 's/^fuzz_target(\([a-z_]*\).*/\1/p' "$here/CMakeLists.txt")
 fi
 
 run_target() {
@@ -38,7 +38,7 @@ run_target() {
     -print_final_stats=1 -artifact_prefix="$folder/crashes/" \
     "$folder/inputs" "$here/corpus/$target" "$here/crashes/$target" >"$folder/log" 2>&1 &
   local pid=$!
-  wait $pid
+  wait "$pid"
   echo $? >"$folder/exit_code"
   rm -rf "/dev/shm/stillmap_fuzz_$pid"
   report "$target"
