@@ -54,16 +54,10 @@ std::vector<std::shared_ptr<const Tile>> tiles_round(
 
 }  // namespace
 
-void TraversabilitySnapshot::publish(Views views, std::shared_ptr<const MapSnapshot> map,
-                                     const TileRange& window, std::uint64_t corrections,
-                                     std::int64_t stamp_ns, std::optional<MapTime> map_time) {
+void TraversabilitySnapshot::publish(Views views, MapInWindow of) {
   const std::scoped_lock lock(mutex_);
   views_ = std::move(views);
-  map_ = std::move(map);
-  window_ = window;
-  corrections_ = corrections;
-  stamp_ns_ = stamp_ns;
-  map_time_ = map_time;
+  of_ = std::move(of);
 }
 
 bool TraversabilitySnapshot::Known::has(const Tile& tile) const {
@@ -80,7 +74,7 @@ TraversabilitySnapshot::Known TraversabilitySnapshot::known(const std::string& p
   const auto found = std::ranges::find_if(
       views_, [&](const auto& candidate) { return candidate->profile.name == profile; });
   if (found == views_.end()) throw std::invalid_argument(unknown_profile(profile, views_));
-  return {*found, map_, window_, corrections_, stamp_ns_, map_time_};
+  return {of_, *found};
 }
 
 TraversabilityCache::TraversabilityCache(const TraversabilitySnapshot& snapshot,

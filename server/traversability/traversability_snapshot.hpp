@@ -20,6 +20,18 @@ namespace stillmap::server {
 /// When a view of the map was published.
 using MapTime = std::chrono::steady_clock::time_point;
 
+/// What of the map the traversability is of.
+struct MapInWindow {
+  /// Of whose tiles: those that are in memory, and in the window. Null before the first.
+  std::shared_ptr<const MapSnapshot> map;
+  TileRange window;
+  /// LatestMap's, and its newest pose's, read before the map.
+  std::uint64_t corrections = 0;
+  std::int64_t stamp_ns = 0;
+  /// When the map was published; nothing where it is not known.
+  std::optional<MapTime> map_time = std::nullopt;
+};
+
 /// The traversability of all robots as of the last update, as immutable views: readers never wait
 /// for an update. Thread-safe.
 class TraversabilitySnapshot {
@@ -27,21 +39,11 @@ class TraversabilitySnapshot {
   /// One view a robot.
   using Views = std::vector<std::shared_ptr<const TraversabilityView>>;
 
-  /// `map`: that they were computed from, where its tiles are in memory and in the window; null
-  /// before the first. `corrections` and `stamp_ns`, that of its newest pose: LatestMap's, read
-  /// before the map. `map_time`: the map's; nothing where it is not known.
-  void publish(Views views, std::shared_ptr<const MapSnapshot> map, const TileRange& window,
-               std::uint64_t corrections = 0, std::int64_t stamp_ns = 0,
-               std::optional<MapTime> map_time = {});
+  void publish(Views views, MapInWindow of);
 
   /// A view, and what of the map it knows.
-  struct Known {
+  struct Known : MapInWindow {
     std::shared_ptr<const TraversabilityView> view;
-    std::shared_ptr<const MapSnapshot> map;
-    TileRange window;
-    std::uint64_t corrections = 0;
-    std::int64_t stamp_ns = 0;
-    std::optional<MapTime> map_time;
 
     /// Whether the view has the tile's surface: one that was read from the disk since is not in it,
     /// one that is new will be.
@@ -56,11 +58,7 @@ class TraversabilitySnapshot {
  private:
   mutable std::mutex mutex_;
   Views views_;
-  std::shared_ptr<const MapSnapshot> map_;
-  TileRange window_;
-  std::uint64_t corrections_ = 0;
-  std::int64_t stamp_ns_ = 0;
-  std::optional<MapTime> map_time_;
+  MapInWindow of_;
 };
 
 /// The traversability of any part of the map: the view that is kept up to date in the background,

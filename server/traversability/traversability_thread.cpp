@@ -81,40 +81,42 @@ TraversabilityThread::TraversabilityThread(std::vector<RobotProfile> robots,
 
 void TraversabilityThread::follow_map(const std::stop_token& stop) {
   const auto map_update = map_.latest.wait_for_update(
-      known_, stop, has_more_on_disk_ ? std::chrono::milliseconds(0) : idle_period);
+      known_.map, stop, has_more_on_disk_ ? std::chrono::milliseconds(0) : idle_period);
   if (!map_update) return has_more_on_disk_ ? update_window() : follow_robot();
   clock_.sleep_until(next_update_, stop);
   if (stop.stop_requested()) return;
   next_update_ = clock_.now() + std::chrono::duration_cast<Clock::duration>(period_);
-  corrections_ = map_.latest.corrections();
-  stamp_ns_ = map_.latest.newest_pose().stamp_ns;
-  const auto [view, map_time] = *map_.latest.wait_for_update(nullptr, {}, {});
-  map_time_ = map_time;
-  if (!known_ || known_->map_id != view->map_id) kept_.clear();
-  known_ = view;
+  MapInWindow next;
+  next.corrections = map_.latest.corrections();
+  next.stamp_ns = map_.latest.newest_pose().stamp_ns;
+  const auto [view, published_at] = *map_.latest.wait_for_update(nullptr, {}, {});
+  next.map = view;
+  next.map_time = published_at;
+  if (!known_.map || known_.map->map_id != next.map->map_id) kept_.clear();
   robot_map_ = map_.latest.newest_pose().T_map_lidar.translation();
-  window_ = window_round(robot_map_, known_->tile_size_m);
+  next.window = window_round(robot_map_, next.map->tile_size_m);
+  known_ = std::move(next);
   update_window();
   const std::chrono::duration<double, std::milli> latency = Clock::now() - map_update->published_at;
   statistics_.add_latency("traversability", latency.count());
 }
 
 void TraversabilityThread::follow_robot() {
-  if (!known_) return;
+  if (!known_.map) return;
   if (retry_ && clock_.now() >= *retry_) return update_window();
   const Eigen::Vector3d robot_map = map_.latest.newest_pose().T_map_lidar.translation();
   if ((robot_map - robot_map_).norm() < noticed_motion_m) return;
   robot_map_ = robot_map;
-  const TileRange window = window_round(robot_map_, known_->tile_size_m);
-  if (window.first == window_.first && window.last == window_.last) return updated_();
-  window_ = window;
+  const TileRange window = window_round(robot_map_, known_.map->tile_size_m);
+  if (window.first == known_.window.first && window.last == known_.window.last) return updated_();
+  known_.window = window;
   update_window();
 }
 
 std::vector<std::shared_ptr<const Tile>> TraversabilityThread::on_disk_nearest_first(
     const MapSnapshot& map, std::vector<std::shared_ptr<const Tile>>& resident) const {
   std::vector<std::pair<double, std::shared_ptr<const Tile>>> found;
-  for (auto& tile : tiles_in_range(map.tiles, window_)) {
+  for (auto& tile : tiles_in_range(map.tiles, known_.window)) {
     if (!is_non_resident(*tile)) {
       resident.push_back(std::move(tile));
       continue;
@@ -165,7 +167,7 @@ MapSnapshot TraversabilityThread::kept_part(const MapSnapshot& map) {
 }
 
 void TraversabilityThread::update_window() {
-  const MapSnapshot part = kept_part(*known_);
+  const MapSnapshot part = kept_part(*known_.map);
   TraversabilityUpdate report;
   // On this thread only: the workers of TBB's other arenas run at full priority.
   tbb::task_arena this_thread(1);
@@ -187,7 +189,7 @@ void TraversabilityThread::publish() {
   for (const RobotProfile& robot : traversability_.profiles()) {
     views.push_back(traversability_.view(robot.name));
   }
-  snapshot_.publish(std::move(views), known_, window_, corrections_, stamp_ns_, map_time_);
+  snapshot_.publish(std::move(views), known_);
 }
 
 }  // namespace stillmap::server

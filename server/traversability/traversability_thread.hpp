@@ -64,12 +64,8 @@ class TraversabilityThread {
   ThrottledLog throttled_log_;
   BackgroundScheduling scheduling_;
   bool has_begun_ = false;
-  std::shared_ptr<const MapSnapshot> known_;
-  std::uint64_t corrections_ = 0;
-  std::int64_t stamp_ns_ = 0;
-  std::optional<MapTime> map_time_;
+  MapInWindow known_;
   Eigen::Vector3d robot_map_ = Eigen::Vector3d::Zero();
-  TileRange window_;
   std::set<TileId> kept_;
   /// Those that are to be kept are not all read yet.
   bool has_more_on_disk_ = false;

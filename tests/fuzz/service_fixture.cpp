@@ -89,7 +89,7 @@ void ServiceFixture::reset() {
 void ServiceFixture::publish_traversability() {
   TraversabilityMap areas({robot()});
   static_cast<void>(areas.update(*latest_map_.view()));
-  snapshot_.publish({areas.view("car")}, nullptr, {{-10'000, -10'000}, {10'000, 10'000}});
+  snapshot_.publish({areas.view("car")}, {nullptr, {{-10'000, -10'000}, {10'000, 10'000}}});
 }
 
 }  // namespace stillmap::fuzz

@@ -160,16 +160,16 @@ TEST_F(TraversabilityThreadTest, KnowsWhichTilesItHas) {
     static_cast<void>(map.update(*all));
     return TraversabilitySnapshot::Views{map.view("small")};
   };
-  snapshot_.publish(views(), all, everywhere);
+  snapshot_.publish(views(), {all, everywhere});
   EXPECT_TRUE(snapshot_.known("small").has(*tile));
   EXPECT_FALSE(snapshot_.known("small").has(on_disk)) << "evicted since";
-  snapshot_.publish(views(), all, {{50, 50}, {60, 60}});
+  snapshot_.publish(views(), {all, {{50, 50}, {60, 60}}});
   EXPECT_FALSE(snapshot_.known("small").has(*tile)) << "outside of the window";
   // Read from the disk since the view was made: the view has nothing there.
-  snapshot_.publish(views(), without, everywhere);
+  snapshot_.publish(views(), {without, everywhere});
   EXPECT_FALSE(snapshot_.known("small").has(*tile));
   // A tile that is new will be in the next view.
-  snapshot_.publish(views(), std::make_shared<MapSnapshot>(), everywhere);
+  snapshot_.publish(views(), {std::make_shared<MapSnapshot>(), everywhere});
   EXPECT_TRUE(snapshot_.known("small").has(*tile));
 }
 
@@ -262,8 +262,9 @@ TEST_F(TraversabilityThreadTest, AViewThatIsUpdatedSeldomIsNotBehindBeforeItsPer
                                   TraversabilityCache::longest_lag(10s));
   const auto known = snapshot_.known("small");
   const auto publish_as_of = [&](std::chrono::seconds age) {
-    snapshot_.publish({known.view}, known.map, known.window, known.corrections, known.stamp_ns,
-                      std::chrono::steady_clock::now() - age);
+    MapInWindow of = known;
+    of.map_time = std::chrono::steady_clock::now() - age;
+    snapshot_.publish({known.view}, std::move(of));
   };
   world_.block(1, 1, 2, 2, 0.3, 2.0, building);
   latest_map_.publish(shared(world_.view()));
@@ -280,7 +281,7 @@ TEST_F(TraversabilityThreadTest, APathIsAnsweredByTheTilesAlongIt) {
     grid.ground(-150, street, 150, street + 1, road);
   latest_map_.publish(shared(grid.view()));
   const TraversabilitySnapshot::Views nothing{traversability_of(MapSnapshot(), small_robot())};
-  snapshot_.publish(nothing, latest_map_.view(), {{99, 99}, {99, 99}});
+  snapshot_.publish(nothing, {latest_map_.view(), {{99, 99}, {99, 99}}});
   TileReader tiles;
   const TraversabilityCache cache(snapshot_, latest_map_, tiles);
   const std::vector<Eigen::Vector2d> positions{{-144.5, -144.5}, {144.5, -144.5}, {144.5, 144.5}};
