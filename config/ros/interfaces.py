@@ -61,7 +61,7 @@ _IDL_WORD = re.compile(r"//[^\n]*|#include[^\n]*|@?\w+(?:::\w+)*|[{};<>\[\],=]")
 class IdlReader:
     """Reads the part of IDL that idl/msg uses. Throws ValueError naming what it does not know."""
 
-    def __init__(self, text: str):
+    def __init__(self, text: str) -> None:
         self._words = _IDL_WORD.findall(text)
         self._at = 0
         self._modules: list[str] = []
@@ -81,12 +81,12 @@ class IdlReader:
         self._at += 1
         return word
 
-    def _expect(self, wanted: str):
+    def _expect(self, wanted: str) -> None:
         word = self._next()
         if word != wanted:
             raise ValueError(f"'{word}' stands where '{wanted}' is expected")
 
-    def _declaration(self, word: str):
+    def _declaration(self, word: str) -> None:
         if word.startswith("//"):
             self._comment.append(word[2:].strip())
             return

@@ -39,7 +39,7 @@ def keyed_message(structure: Structure) -> str:
                       f"    struct {structure.name} {{", *members, "    };", "  };", "};"]) + "\n"
 
 
-def main():
+def main() -> None:
     folder = Path(__file__).parent / PACKAGE
     structures = read_idl(sorted(Path(sys.argv[1]).glob("*.idl")))
     texts: dict[Path, list[str]] = {}

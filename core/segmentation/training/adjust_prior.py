@@ -25,7 +25,7 @@ from range_images import ImageModel
 from scans import IGNORED, ScanFiles
 
 
-def offsets(shares, kind, share):
+def offsets(shares: np.ndarray, kind: str, share: float) -> np.ndarray:
     """What to subtract from the score of each class; nothing from the ignored class."""
     logs = np.log(np.maximum(class_weights(shares, kind).numpy(), 1e-6))
     logs -= np.delete(logs, IGNORED).min()
@@ -33,7 +33,7 @@ def offsets(shares, kind, share):
     return (share * logs).astype(np.float32)
 
 
-def last_bias(graph):
+def last_bias(graph: onnx.GraphProto) -> onnx.TensorProto:
     """The initializer that is the bias of the network's last convolution."""
     last = [n for n in graph.node if n.op_type in ("Conv", "ConvTranspose")][-1]
     if len(last.input) < 3:
@@ -46,12 +46,12 @@ def last_bias(graph):
     return next(tensor for tensor in graph.initializer if tensor.name == name)
 
 
-def crc32_of(file):
+def crc32_of(file: Path) -> str:
     """As Stillmap writes it to int8.yaml."""
     return f"{zlib.crc32(file.read_bytes()):08x}"
 
 
-def adjust(source, target, change):
+def adjust(source: Path, target: Path, change: np.ndarray) -> None:
     """Writes the model `source` to the folder `target`, with `change` subtracted from its scores."""
     network = onnx.load(str(source / "model.onnx"))
     bias = last_bias(network.graph)
@@ -72,7 +72,7 @@ def adjust(source, target, change):
         calibration.write_text(text.replace(crc32, crc32_of(target / "model.onnx"), 1))
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,11 +1,20 @@
 """Augmentation of training scans, against overfitting to one sensor or one city."""
 
+from typing import Any
+
 import numpy as np
 
-from scans import IGNORED
+from range_images import RangeImage
+from scans import IGNORED, Scan
 
 
-def aim(points, classes, width_rad, share, random):
+def aim(
+    points: np.ndarray,
+    classes: np.ndarray,
+    width_rad: float,
+    share: float,
+    random: np.random.Generator,
+) -> float:
     """Azimuth [rad] of the middle of a crop of this width: uniform or, in this share of draws, such
     that the crop contains a point of a class drawn uniformly from those of the scan."""
     present = np.flatnonzero(np.bincount(classes))
@@ -17,14 +26,14 @@ def aim(points, classes, width_rad, share, random):
     return np.arctan2(y, x) + width_rad * random.uniform(-0.5, 0.5)
 
 
-def in_sector(points, middle_rad, width_rad):
+def in_sector(points: np.ndarray, middle_rad: float, width_rad: float) -> np.ndarray:
     """Mask of the points in a sector around the vertical axis."""
     middle = np.array([np.cos(middle_rad), np.sin(middle_rad)], np.float32)
     distance = np.hypot(points[:, 0], points[:, 1])
     return points[:, :2] @ middle >= np.cos(min(width_rad / 2, np.pi)) * distance - 1e-3
 
 
-def draw_motion(settings, random):
+def draw_motion(settings: dict[str, Any], random: np.random.Generator) -> np.ndarray:
     """A random 3 x 3 matrix, for multiplication from the right with rows of points: rotation about
     the vertical, mirroring, tilt and scale."""
     motion = np.eye(3)
@@ -41,7 +50,9 @@ def draw_motion(settings, random):
     return motion.astype(np.float32)
 
 
-def _change_remission(remission, settings, random):
+def _change_remission(
+    remission: np.ndarray, settings: dict[str, Any], random: np.random.Generator
+) -> np.ndarray:
     """Random gain, offset, contrast and noise."""
     jitter = settings["remission_jitter"]
     gain, power = np.exp(random.normal(0, jitter, 2))
@@ -50,7 +61,14 @@ def _change_remission(remission, settings, random):
     return np.clip(changed, 0, 1).astype(np.float32)
 
 
-def augment_points(points, remission, classes, motion, settings, random):
+def augment_points(
+    points: np.ndarray,
+    remission: np.ndarray,
+    classes: np.ndarray,
+    motion: np.ndarray,
+    settings: dict[str, Any],
+    random: np.random.Generator,
+) -> Scan:
     """A scan as another sensor might measure it: drops points, limits the range, applies `motion`,
     lifts the sensor, adds range noise, changes remission."""
     keep = random.random(len(points)) >= random.uniform(0, settings["drop_points"])
@@ -65,7 +83,9 @@ def augment_points(points, remission, classes, motion, settings, random):
     return points, _change_remission(remission, settings, random), classes
 
 
-def drop_beams(image, beams, settings, random):
+def drop_beams(
+    image: RangeImage, beams: int, settings: dict[str, Any], random: np.random.Generator
+) -> None:
     """Clears the rows of beams: of random ones, and sometimes of every other one. Of more beams than
     rows, it drops rows."""
     rows = len(image.point)
@@ -78,7 +98,9 @@ def drop_beams(image, beams, settings, random):
     image.channels[:, lost] = 0
 
 
-def crop(channels, target, columns, azimuth_rad):
+def crop(
+    channels: np.ndarray, target: np.ndarray, columns: int, azimuth_rad: float
+) -> tuple[np.ndarray, np.ndarray]:
     """A crop of the image, `columns` wide, around this azimuth; it may cross the image's seam."""
     start = round(0.5 * (1 - azimuth_rad / np.pi) * channels.shape[2] - columns / 2)
     chosen = np.arange(start, start + columns) % channels.shape[2]

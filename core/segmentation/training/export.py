@@ -10,8 +10,10 @@ import argparse
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import torch
+from torch import nn
 
 from model_folder import (
     ProgramFault,
@@ -25,7 +27,7 @@ from model_folder import (
 from networks import make_network
 
 
-def load_run(folder, file="best.pt"):
+def load_run(folder: Path, file: str = "best.pt") -> tuple[nn.Module, dict[str, Any]]:
     """The network of best.pt or last.pt, and the run's state."""
     state = torch.load(folder / file, map_location="cpu")
     config = state["config"]
@@ -34,18 +36,18 @@ def load_run(folder, file="best.pt"):
     return network.eval(), state
 
 
-def trained_for(state):
+def trained_for(state: dict[str, Any]) -> dict[str, Any]:
     """The lidars whose scans the run saw; nothing of a run that an older trainer made."""
     return {"trained_for": state["trained_for"]} if "trained_for" in state else {}
 
 
-def lidar_height(state):
+def lidar_height(state: dict[str, Any]) -> dict[str, float]:
     """At which height they stood; nothing where nobody told."""
     height_m = state.get("lidar_height_m")
     return {} if height_m is None else {"lidar_height_m": float(height_m)}
 
 
-def describe_run(arguments, state):
+def describe_run(arguments: argparse.Namespace, state: dict[str, Any]) -> dict[str, Any]:
     config = state["config"]
     image = {**config["image"]}
     if arguments.columns:
@@ -79,7 +81,7 @@ def describe_run(arguments, state):
     )
 
 
-def read_arguments():
+def read_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -102,7 +104,9 @@ def read_arguments():
     return arguments
 
 
-def calibrate_and_compare(arguments, network, description):
+def calibrate_and_compare(
+    arguments: argparse.Namespace, network: nn.Module, description: dict[str, Any]
+) -> None:
     """Makes int8.yaml where sequences are given, and prints how engines and PyTorch agree."""
     engines = [("opencv", "fp32"), ("onednn", "fp32")]
     if arguments.calibrate:
@@ -119,7 +123,7 @@ def calibrate_and_compare(arguments, network, description):
         )
 
 
-def main():
+def main() -> None:
     arguments = read_arguments()
     network, state = load_run(arguments.run, "last.pt" if arguments.last else "best.pt")
     description = describe_run(arguments, state)

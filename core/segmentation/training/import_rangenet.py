@@ -13,11 +13,14 @@ import argparse
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any, NoReturn
 
 import torch
 import yaml
+from torch import nn
 
 from model_folder import (
+    Agreement,
     ProgramFault,
     check_engines,
     describe,
@@ -36,7 +39,7 @@ class ImportFault(Exception):
     """A model folder that cannot be imported; names the file and the fault."""
 
 
-def read_yaml(file):
+def read_yaml(file: Path) -> dict[str, Any]:
     try:
         content = yaml.safe_load(file.read_text())
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as fault:
@@ -46,7 +49,7 @@ def read_yaml(file):
     return content
 
 
-def value_at(content, file, *names):
+def value_at(content: dict[str, Any], file: Path, *names: str) -> Any:
     """A nested field; the fault names its path."""
     for depth, name in enumerate(names, 1):
         if not isinstance(content, dict) or name not in content:
@@ -55,7 +58,7 @@ def value_at(content, file, *names):
     return content
 
 
-def read_weights(file):
+def read_weights(file: Path) -> dict[str, torch.Tensor]:
     """A checkpoint's tensors. Only tensors are read: a file cannot run code."""
     try:
         state = torch.load(file, map_location="cpu", weights_only=True)
@@ -70,7 +73,7 @@ def read_weights(file):
     return {name.removeprefix("module."): tensor for name, tensor in state.items()}
 
 
-def load_part(part, file):
+def load_part(part: nn.Module, file: Path) -> None:
     state = read_weights(file)
     for name, tensor in state.items():
         if tensor.is_floating_point() and not torch.isfinite(tensor).all():
@@ -81,7 +84,7 @@ def load_part(part, file):
         raise ImportFault(f"{file}: does not fit arch_cfg.yaml: {fault}") from fault
 
 
-def read_classes(folder):
+def read_classes(folder: Path) -> list[str]:
     """Stillmap's class of each output; `unlabeled` for labels outside the single-scan task."""
     file = folder / "data_cfg.yaml"
     original = value_at(read_yaml(file), file, "learning_map_inv")
@@ -91,7 +94,7 @@ def read_classes(folder):
     return [CLASS_NAMES[CLASS_OF_ID.get(original[n], 0)] for n in range(len(original))]
 
 
-def read_network(folder):
+def read_network(folder: Path) -> tuple[RangeNet, dict[str, Any], int]:
     file = folder / "arch_cfg.yaml"
     arch = read_yaml(file)
     for part in ("backbone", "decoder"):
@@ -114,7 +117,7 @@ def read_network(folder):
     return network.eval(), arch, layers
 
 
-def read_knn(arch):
+def read_knn(arch: dict[str, Any]) -> dict[str, float]:
     """The post-processing that every published ++ figure has, with the folder's parameters."""
     written = arch.get("post", {}).get("KNN", {}).get("params", {})
     return {
@@ -125,7 +128,9 @@ def read_knn(arch):
     }
 
 
-def describe_folder(folder, arch, layers, arguments):
+def describe_folder(
+    folder: Path, arch: dict[str, Any], layers: int, arguments: argparse.Namespace
+) -> dict[str, Any]:
     file = folder / "arch_cfg.yaml"
     sensor = value_at(arch, file, "dataset", "sensor")
     size = value_at(sensor, file, "img_prop")
@@ -148,7 +153,7 @@ def describe_folder(folder, arch, layers, arguments):
     return describe(words, image, means, deviations, read_classes(folder), read_knn(arch))
 
 
-def read_arguments():
+def read_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -162,12 +167,14 @@ def read_arguments():
     return parser.parse_args()
 
 
-def agree(results):
+def agree(results: list[Agreement]) -> bool:
     """Tolerance for engines of the same precision."""
     return all(d <= MAX_DIFFERENCE and a >= MIN_AGREEMENT for _, _, d, a in results)
 
 
-def compare_engines(arguments, network, description):
+def compare_engines(
+    arguments: argparse.Namespace, network: nn.Module, description: dict[str, Any]
+) -> list[Agreement]:
     """What check_engines() gives for the engines of full precision."""
     images = random_images(1, (5, description["image"]["rows"], description["image"]["columns"]))
     engines = [("opencv", "fp32"), ("onednn", "fp32")]
@@ -177,7 +184,7 @@ def compare_engines(arguments, network, description):
         )
 
 
-def end_without_comparison(fault, what_is_there):
+def end_without_comparison(fault: ProgramFault, what_is_there: str) -> NoReturn:
     print(
         f"import_rangenet: the engines cannot be compared with PyTorch: {fault}. {what_is_there}; "
         "--no-check leaves the comparison out",
@@ -186,7 +193,7 @@ def end_without_comparison(fault, what_is_there):
     sys.exit(2)
 
 
-def main():
+def main() -> None:
     arguments = read_arguments()
     torch.set_num_threads(torch.multiprocessing.cpu_count())
     try:

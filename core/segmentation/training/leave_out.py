@@ -12,6 +12,7 @@ weights are scored, not those that did best on the sequences left out.
 import argparse
 import copy
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -22,7 +23,7 @@ from train import Run, read_config, train
 from validation import Confusion
 
 
-def sequences_of(config):
+def sequences_of(config: dict[str, Any]) -> list[str]:
     """Names of all sequences of the training folders, or of those that the configuration lists."""
     data = config["data"]
     image = ImageModel(**config["image"])
@@ -30,7 +31,7 @@ def sequences_of(config):
     return sorted({scan.parent.parent.name for scan, _ in scans.files})
 
 
-def fold_config(config, left_out, every):
+def fold_config(config: dict[str, Any], left_out: list[str], every: list[str]) -> dict[str, Any]:
     """The configuration that trains on all sequences of `every` but those left out."""
     unknown = set(left_out) - set(every)
     if unknown:
@@ -42,7 +43,7 @@ def fold_config(config, left_out, every):
     return changed
 
 
-def score_left_out(config, folder, device):
+def score_left_out(config: dict[str, Any], folder: Path, device: str) -> Confusion:
     """Trains, and counts every scan of the sequences left out."""
     run = Run(config, folder, device)
     train(run)
@@ -50,12 +51,12 @@ def score_left_out(config, folder, device):
     return run.validate()
 
 
-def show(name, confusion):
+def show(name: str, confusion: Confusion) -> None:
     print(f"{name}: mean IoU of the classes there {100 * confusion.mean_iou():.1f}")
     print("  " + confusion.table(), flush=True)
 
 
-def read_arguments():
+def read_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -67,7 +68,7 @@ def read_arguments():
     return parser.parse_args()
 
 
-def main():
+def main() -> None:
     arguments = read_arguments()
     config = read_config(arguments.config, arguments.set)
     torch.set_num_threads(config["threads"])

@@ -1,12 +1,13 @@
 """The weighted cross-entropy, equation (3) of the paper, and the Lovasz-softmax loss."""
 
+import numpy as np
 import torch
 from torch.nn import functional
 
 from scans import IGNORED
 
 
-def class_weights(shares, kind):
+def class_weights(shares: np.ndarray | list[float], kind: str) -> torch.Tensor:
     """Weights against class imbalance; 0 for the ignored class.
 
     `log`: 1 / log(share + 1.02), the form that the paper prints, with the constant that keeps the
@@ -23,14 +24,16 @@ def class_weights(shares, kind):
     return weights
 
 
-def weighted_cross_entropy(scores, target, weights):
+def weighted_cross_entropy(
+    scores: torch.Tensor, target: torch.Tensor, weights: torch.Tensor
+) -> torch.Tensor:
     """Mean over the pixels with a class, weighted by class; 0 when there are none."""
     if not (target != IGNORED).any():
         return 0 * scores.sum()
     return functional.cross_entropy(scores, target, weights, ignore_index=IGNORED)
 
 
-def lovasz_softmax(scores, target, pixels=16384):
+def lovasz_softmax(scores: torch.Tensor, target: torch.Tensor, pixels: int = 16384) -> torch.Tensor:
     """A surrogate for 1 - mIoU (Berman et al., CVPR 2018): the Lovasz extension of the Jaccard
     loss, averaged over the classes in the truth. On a random subset of at most `pixels` pixels,
     since all of them are sorted for every class."""
@@ -48,7 +51,7 @@ def lovasz_softmax(scores, target, pixels=16384):
     return torch.stack(losses).mean() if losses else 0 * scores.sum()
 
 
-def _jaccard_gradient(truth):
+def _jaccard_gradient(truth: torch.Tensor) -> torch.Tensor:
     """Increment of the Jaccard loss by each pixel, in descending order of errors."""
     left = truth.sum() - truth.cumsum(0)
     union = truth.sum() + (1 - truth).cumsum(0)

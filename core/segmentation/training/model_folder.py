@@ -2,19 +2,27 @@
 
 import shutil
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
 import yaml
+from torch import nn
 
 from networks import WithSoftmax
 from scans import CLASS_NAMES
 
+# Engine, precision, largest difference of probabilities, share of pixels of the same class.
+Agreement = tuple[str, str, float, float]
+
 CHANNELS = ("range", "x", "y", "z", "remission", "slope")
 
 
-def export_onnx(network, file, shape, free_size):
+def export_onnx(
+    network: nn.Module, file: Path, shape: tuple[int, int, int], free_size: bool
+) -> None:
     """Writes the network with a soft-max. `shape`: channels, rows, columns; `free_size` leaves the
     last two open."""
     axes = {2: "rows", 3: "columns"}
@@ -30,17 +38,17 @@ def export_onnx(network, file, shape, free_size):
 
 
 def describe(
-    words,
-    image,
-    mean,
-    deviation,
-    classes,
-    knn,
-    follow_sensor=False,
-    voxel_votes=None,
-    unsure_votes=None,
-    island_votes=None,
-):
+    words: dict[str, Any],
+    image: dict[str, Any],
+    mean: Sequence[float],
+    deviation: Sequence[float],
+    classes: list[str],
+    knn: dict[str, Any] | None,
+    follow_sensor: bool = False,
+    voxel_votes: dict[str, Any] | None = None,
+    unsure_votes: dict[str, Any] | None = None,
+    island_votes: dict[str, Any] | None = None,
+) -> dict[str, Any]:
     """The content of model.yaml. `words`: name, licence, sensor, trained_for, lidar_height_m,
     training, accuracy; `classes`: name of the class of each output; `knn`: None, or neighbours, window, sigma,
     cutoff_m; `voxel_votes`: None, or edge_m, height_m, neighbour_weight, own_weight; `unsure_votes`:
@@ -64,7 +72,7 @@ def describe(
     return description
 
 
-def write_model(folder, network, description):
+def write_model(folder: str | Path, network: nn.Module, description: dict[str, Any]) -> None:
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     image = description["image"]
@@ -80,7 +88,7 @@ class ProgramFault(Exception):
     """The program `stillmap` cannot be started, or failed."""
 
 
-def find_program(name):
+def find_program(name: str | Path) -> Path:
     """Where the program is: a path, also one without a folder (as `./stillmap` becomes), else a name
     in PATH."""
     path = Path(name)
@@ -92,7 +100,7 @@ def find_program(name):
     return Path(found)
 
 
-def run_stillmap(stillmap, *arguments):
+def run_stillmap(stillmap: str | Path, *arguments: object) -> None:
     """Runs it; what it prints is seen. Raises ProgramFault where that fails."""
     command = [str(find_program(stillmap)), *map(str, arguments)]
     try:
@@ -104,7 +112,14 @@ def run_stillmap(stillmap, *arguments):
         raise ProgramFault(f"'stillmap {words}' failed with {fault.returncode}") from fault
 
 
-def run_engine(stillmap, folder, images, engine, precision, scratch):
+def run_engine(
+    stillmap: str | Path,
+    folder: Path,
+    images: np.ndarray,
+    engine: str,
+    precision: str,
+    scratch: Path,
+) -> np.ndarray:
     """Probabilities (n x classes x rows x columns) of `images` by one of Stillmap's engines."""
     inputs, outputs = scratch / "input.f32", scratch / f"{engine}_{precision}.f32"
     images.astype("<f4").tofile(inputs)
@@ -114,13 +129,20 @@ def run_engine(stillmap, folder, images, engine, precision, scratch):
     return np.fromfile(outputs, "<f4").reshape(n, -1, rows, columns)
 
 
-def compare(reference, other):
+def compare(reference: np.ndarray, other: np.ndarray) -> tuple[float, float]:
     """Largest difference, and the share of pixels with the same most probable class."""
     same = reference.argmax(1) == other.argmax(1)
     return float(np.abs(reference - other).max()), float(same.mean())
 
 
-def check_engines(stillmap, folder, network, images, scratch, engines):
+def check_engines(
+    stillmap: str | Path,
+    folder: Path,
+    network: nn.Module,
+    images: np.ndarray,
+    scratch: Path,
+    engines: list[tuple[str, str]],
+) -> list[Agreement]:
     """Runs the same images through PyTorch and `engines` [(engine, precision)]; prints how they
     agree, and returns [(engine, precision, largest difference, agreement)]."""
     with torch.no_grad():
@@ -138,7 +160,7 @@ def check_engines(stillmap, folder, network, images, scratch, engines):
     return results
 
 
-def random_images(count, shape, seed=1):
+def random_images(count: int, shape: tuple[int, int, int], seed: int = 1) -> np.ndarray:
     """Images with empty pixels, of about the spread of normalised scans. `shape`: channels, rows,
     columns."""
     random = np.random.default_rng(seed)
@@ -147,5 +169,5 @@ def random_images(count, shape, seed=1):
     return images
 
 
-def class_names(count=len(CLASS_NAMES)):
+def class_names(count: int = len(CLASS_NAMES)) -> list[str]:
     return CLASS_NAMES[:count]

@@ -4,6 +4,9 @@ All take range images, N x inputs x rows x columns (range, x, y, z, remission, o
 slope, normalised), and give class scores (logits), N x classes x rows x columns.
 """
 
+from collections.abc import Sequence
+from typing import Any
+
 import torch
 from torch import nn
 from torch.nn import functional
@@ -11,7 +14,7 @@ from torch.nn import functional
 SLOPE = 0.1  # of every leaky ReLU
 
 
-def activate(x):
+def activate(x: torch.Tensor) -> torch.Tensor:
     return functional.leaky_relu(x, SLOPE, inplace=True)
 
 
@@ -20,7 +23,7 @@ class Widen(nn.ConvTranspose2d):
     convolution whose channels are laid out side by side: on a processor PyTorch's own takes longer
     than all the rest of the network."""
 
-    def forward(self, x):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
         if torch.onnx.is_in_onnx_export():
             return super().forward(x)
         n, _, rows, columns = x.shape
@@ -34,7 +37,7 @@ class Widen(nn.ConvTranspose2d):
         y = y.reshape(n, self.out_channels, high * rows, wide * columns)
         return y if self.bias is None else y + self.bias[:, None, None]
 
-    def _three_wide(self):
+    def _three_wide(self) -> torch.Tensor:
         """Even columns see taps 3 and 1, odd ones 2 and 0."""
         tap = self.weight[:, :, 0].unbind(-1)
         none = torch.zeros_like(tap[0])
@@ -46,21 +49,23 @@ class Widen(nn.ConvTranspose2d):
 class Block(nn.Module):
     """DarkNet's residual block; the sum stands after the second activation."""
 
-    def __init__(self, channels, middle, momentum):
+    def __init__(self, channels: int, middle: int, momentum: float) -> None:
         super().__init__()
         self.conv1 = nn.Conv2d(channels, middle, 1, bias=False)
         self.bn1 = nn.BatchNorm2d(middle, momentum=momentum)
         self.conv2 = nn.Conv2d(middle, channels, 3, padding=1, bias=False)
         self.bn2 = nn.BatchNorm2d(channels, momentum=momentum)
 
-    def forward(self, x):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
         return activate(self.bn2(self.conv2(activate(self.bn1(self.conv1(x)))))) + x
 
 
 class EncoderStage(nn.Module):
     """A strided convolution, then residual blocks."""
 
-    def __init__(self, inputs, outputs, stride, blocks, momentum):
+    def __init__(
+        self, inputs: int, outputs: int, stride: Sequence[int], blocks: int, momentum: float
+    ) -> None:
         super().__init__()
         self.conv = nn.Conv2d(inputs, outputs, 3, stride=stride, padding=1, bias=False)
         self.bn = nn.BatchNorm2d(outputs, momentum=momentum)
@@ -68,7 +73,7 @@ class EncoderStage(nn.Module):
         for i in range(blocks):
             self.add_module(f"residual_{i}", Block(outputs, outputs // 2, momentum))
 
-    def forward(self, x):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
         x = activate(self.bn(self.conv(x)))
         for i in range(self.blocks):
             x = getattr(self, f"residual_{i}")(x)
@@ -78,7 +83,7 @@ class EncoderStage(nn.Module):
 class DarkNetDecoderStage(nn.Module):
     """Doubles the width; a stage of stride 1 has a plain convolution in its place."""
 
-    def __init__(self, inputs, outputs, stride, momentum):
+    def __init__(self, inputs: int, outputs: int, stride: int, momentum: float) -> None:
         super().__init__()
         if stride == 2:
             self.upconv = Widen(inputs, outputs, (1, 4), (1, 2), (0, 1))
@@ -87,7 +92,7 @@ class DarkNetDecoderStage(nn.Module):
         self.bn = nn.BatchNorm2d(outputs, momentum=momentum)
         self.residual = Block(outputs, inputs, momentum)
 
-    def forward(self, x):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
         widen = self.upconv if hasattr(self, "upconv") else self.conv
         return self.residual(activate(self.bn(widen(x))))
 
@@ -95,7 +100,9 @@ class DarkNetDecoderStage(nn.Module):
 class DarkNetBackbone(nn.Module):
     BLOCKS = {21: (1, 1, 2, 2, 1), 53: (1, 2, 8, 8, 4)}
 
-    def __init__(self, layers, strides, dropout, momentum, inputs):
+    def __init__(
+        self, layers: int, strides: list[int], dropout: float, momentum: float, inputs: int
+    ) -> None:
         super().__init__()
         self.conv1 = nn.Conv2d(inputs, 32, 3, padding=1, bias=False)
         self.bn1 = nn.BatchNorm2d(32, momentum=momentum)
@@ -104,7 +111,7 @@ class DarkNetBackbone(nn.Module):
             stage = EncoderStage(32 << k, 64 << k, (1, stride), blocks, momentum)
             self.add_module(f"enc{k + 1}", stage)
 
-    def forward(self, x):
+    def forward(self, x: torch.Tensor) -> tuple[torch.Tensor, list[torch.Tensor]]:
         x = activate(self.bn1(self.conv1(x)))
         skips = []
         for k in range(1, 6):
@@ -115,7 +122,7 @@ class DarkNetBackbone(nn.Module):
 
 
 class DarkNetDecoder(nn.Module):
-    def __init__(self, strides, dropout, momentum):
+    def __init__(self, strides: list[int], dropout: float, momentum: float) -> None:
         super().__init__()
         self.strides = strides
         self.dropout = nn.Dropout2d(dropout)
@@ -123,7 +130,7 @@ class DarkNetDecoder(nn.Module):
             stage = DarkNetDecoderStage(32 << k, 16 << k, strides[k - 1], momentum)
             self.add_module(f"dec{k}", stage)
 
-    def forward(self, x, skips):
+    def forward(self, x: torch.Tensor, skips: list[torch.Tensor]) -> torch.Tensor:
         for k in range(5, 0, -1):
             x = getattr(self, f"dec{k}")(x)
             # A stage that does not change the width has no skip.
@@ -135,7 +142,15 @@ class DarkNetDecoder(nn.Module):
 class RangeNet(nn.Module):
     """RangeNet21 or RangeNet53; parameters are named as in lidar-bonnetal's checkpoint files."""
 
-    def __init__(self, layers=53, classes=20, output_stride=32, dropout=0.01, momentum=0.01, inputs=5):
+    def __init__(
+        self,
+        layers: int = 53,
+        classes: int = 20,
+        output_stride: int = 32,
+        dropout: float = 0.01,
+        momentum: float = 0.01,
+        inputs: int = 5,
+    ) -> None:
         super().__init__()
         strides = [2] * 5
         for k in range(4, -1, -1):
@@ -145,20 +160,20 @@ class RangeNet(nn.Module):
         self.decoder = DarkNetDecoder(strides, dropout, momentum)
         self.head = nn.Sequential(nn.Dropout2d(dropout), nn.Conv2d(32, classes, 3, padding=1))
 
-    def forward(self, x):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
         return self.head(self.decoder(*self.backbone(x)))
 
 
 class LightDecoderStage(nn.Module):
     """Transposed convolution with kernel = stride, plus the skip, then a block."""
 
-    def __init__(self, inputs, outputs, stride, momentum):
+    def __init__(self, inputs: int, outputs: int, stride: Sequence[int], momentum: float) -> None:
         super().__init__()
         self.upconv = Widen(inputs, outputs, stride, stride, bias=False)
         self.bn = nn.BatchNorm2d(outputs, momentum=momentum)
         self.residual = Block(outputs, outputs // 2, momentum)
 
-    def forward(self, x, skip):
+    def forward(self, x: torch.Tensor, skip: torch.Tensor) -> torch.Tensor:
         return self.residual(activate(self.bn(self.upconv(x))) + skip)
 
 
@@ -169,7 +184,15 @@ class LightRangeNet(nn.Module):
     `stages` lists [channels, [stride of rows, of columns], blocks] of the encoder.
     """
 
-    def __init__(self, stem, stages, classes=20, dropout=0.01, momentum=0.01, inputs=5):
+    def __init__(
+        self,
+        stem: int,
+        stages: list,
+        classes: int = 20,
+        dropout: float = 0.01,
+        momentum: float = 0.01,
+        inputs: int = 5,
+    ) -> None:
         super().__init__()
         self.conv1 = nn.Conv2d(inputs, stem, 3, stride=(1, 2), padding=1, bias=False)
         self.bn1 = nn.BatchNorm2d(stem, momentum=momentum)
@@ -183,7 +206,7 @@ class LightRangeNet(nn.Module):
         self.dropout = nn.Dropout2d(dropout)
         self.head = Widen(stem, classes, (1, 4), (1, 2), (0, 1))
 
-    def forward(self, x):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
         x = activate(self.bn1(self.conv1(x)))
         skips = []
         for stage in self.encoder:
@@ -198,15 +221,15 @@ class LightRangeNet(nn.Module):
 class WithSoftmax(nn.Module):
     """The exported network: probabilities instead of scores."""
 
-    def __init__(self, network):
+    def __init__(self, network: nn.Module) -> None:
         super().__init__()
         self.network = network
 
-    def forward(self, x):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
         return torch.softmax(self.network(x), dim=1)
 
 
-def make_network(settings, classes, inputs=5):
+def make_network(settings: dict[str, Any], classes: int, inputs: int = 5) -> nn.Module:
     """The network that a configuration's `network` section describes."""
     options = dict(settings)
     kind = options.pop("kind")

@@ -1,7 +1,7 @@
 """Range images of lidar scans: the projection and normalisation that the C++ engine uses."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Optional
 
 import numpy as np
 
@@ -15,10 +15,10 @@ class ImageModel:
     columns: int
     fov_up_deg: float
     fov_down_deg: float
-    rings: Optional[int] = None
+    rings: int | None = None
 
     @property
-    def beams(self):
+    def beams(self) -> int:
         return self.rows if self.rings is None else self.rings
 
 
@@ -32,12 +32,12 @@ class RangeImage:
     pixel: np.ndarray
 
 
-def elevation_rad(points):
+def elevation_rad(points: np.ndarray) -> np.ndarray:
     """Elevation of points (n x 3, none at the origin) above the lidar's horizontal plane."""
     return np.arcsin(points[:, 2] / np.sqrt((points**2).sum(axis=1)))
 
 
-def project(points, remission, model):
+def project(points: np.ndarray, remission: np.ndarray, model: ImageModel) -> RangeImage:
     """Spherical projection; a pixel keeps the nearest of its points.
 
     `points`: n x 3 in the lidar's frame [m], all finite and none at the origin.
@@ -68,7 +68,7 @@ def project(points, remission, model):
 SLOPE_REACH = 3
 
 
-def _nearest_in_column(values, seen, step):
+def _nearest_in_column(values: np.ndarray, seen: np.ndarray, step: int) -> np.ndarray:
     """Of each pixel's next seen ones in its column, at most SLOPE_REACH rows away, above (step -1) or
     below (1); the pixel itself where there is none. `values`: k x rows x columns."""
     found = values.copy()
@@ -81,7 +81,7 @@ def _nearest_in_column(values, seen, step):
     return found
 
 
-def slope_rad(channels, seen):
+def slope_rad(channels: np.ndarray, seen: np.ndarray) -> np.ndarray:
     """Angle of the surface above the horizontal, along the column: 0 on level ground, pi / 2 on a
     wall, more under an overhang; 0 where the column shows nothing else nearby.
 
@@ -94,7 +94,7 @@ def slope_rad(channels, seen):
     return np.arctan2(up, away) * seen
 
 
-def normalise(image, mean, deviation):
+def normalise(image: RangeImage, mean: Sequence[float], deviation: Sequence[float]) -> np.ndarray:
     """(value - mean) / deviation, and 0 in all channels of an empty pixel. Six of each: the sixth
     channel is the slope."""
     mean = np.asarray(mean, np.float32)[:, None, None]

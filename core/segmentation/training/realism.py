@@ -24,27 +24,36 @@ import numpy as np
 from range_images import ImageModel, project
 from scans import CLASS_NAMES, IGNORED, ScanFiles
 
+# Of each class and measure; distance, class, measure, real median, simulated median.
+Measured = dict[tuple[int, str], np.ndarray]
+Row = tuple[float, str, str, float, float]
+
 MEASURES = ("share", "range", "remission", "height", "rough", "porous", "holes")
 # Of a class in a scan; more pixels say no more about a distribution.
 MOST_PIXELS = 400
 FEWEST_PIXELS = 100
 
 
-def row_differences(depth, seen):
+def row_differences(depth: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Relative jump to the next pixel of the row, and relative second difference; NaN at holes."""
     depth = np.where(seen, depth, np.nan)
     after, before = np.roll(depth, -1, axis=1), np.roll(depth, 1, axis=1)
     return np.abs(after - depth) / depth, np.abs(before - 2 * depth + after) / depth
 
 
-def share_of_holes(seen):
+def share_of_holes(seen: np.ndarray) -> np.ndarray:
     empty = np.pad(~seen, ((1, 1), (0, 0)), mode="edge").astype(np.float32)
     rows = empty[:-2] + empty[1:-1] + empty[2:]
     around = np.roll(rows, 1, axis=1) + rows + np.roll(rows, -1, axis=1)
     return (around - ~seen) / 8
 
 
-def measure(scans, index, found, random):
+def measure(
+    scans: ScanFiles,
+    index: int,
+    found: dict[tuple[int, str], list[np.ndarray]],
+    random: np.random.Generator,
+) -> None:
     """Adds what a scan shows of each class to `found` {(class, measure): [arrays]}."""
     points, remission, classes = scans.read(index)
     image = project(points, remission, scans.images[index])
@@ -64,7 +73,7 @@ def measure(scans, index, found, random):
             found.setdefault((k, name), []).append(chosen[np.isfinite(chosen)])
 
 
-def measure_all(folder, most, rows=None):
+def measure_all(folder: str, most: int, rows: set[int] | None = None) -> tuple[Measured, set[int]]:
     scans = ScanFiles([folder], [], ImageModel(64, 2048, 3, -25))
     random, found, taken = np.random.default_rng(1), {}, set()
     for index in scans.evenly_chosen(most):
@@ -74,14 +83,14 @@ def measure_all(folder, most, rows=None):
     return {key: np.concatenate(values) for key, values in found.items()}, taken
 
 
-def distance(one, other):
+def distance(one: np.ndarray, other: np.ndarray) -> float:
     """The statistic of Kolmogorov and Smirnov of two samples."""
     values = np.sort(np.concatenate([one, other]))
     shares = [np.searchsorted(np.sort(v), values, side="right") / len(v) for v in (one, other)]
     return float(np.abs(shares[0] - shares[1]).max())
 
 
-def compare(real, simulated):
+def compare(real: Measured, simulated: Measured) -> list[Row]:
     """[(distance, class, measure, real median, simulated median)], largest distance first."""
     rows = []
     for (k, name), values in real.items():
@@ -94,7 +103,7 @@ def compare(real, simulated):
     return sorted(rows, reverse=True)
 
 
-def show(rows):
+def show(rows: list[Row]) -> None:
     classes = [name for name in CLASS_NAMES if any(row[1] == name for row in rows)]
     print("distance".ljust(15) + "".join(name.rjust(10) for name in MEASURES))
     for label in classes:
@@ -106,7 +115,7 @@ def show(rows):
         print(f"{far:.2f}  {label} {name}: real {real:.3g}, simulated {simulated:.3g}")
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

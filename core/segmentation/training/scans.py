@@ -1,12 +1,17 @@
 """SemanticKITTI folders as a training set: scans, their classes, their sensors."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
 
 from range_images import ImageModel, elevation_rad
+
+# Points (n x 3, lidar frame [m]), remission (n) and classes (n).
+Scan = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 IGNORED = 0
 
@@ -41,7 +46,7 @@ for _id, _class in CLASS_OF_ID.items():
     _CLASSES[_id] = _class
 
 
-def classes_of(raw_labels):
+def classes_of(raw_labels: np.ndarray) -> np.ndarray:
     """Network classes of raw labels (instance id in the high 16 bits)."""
     return _CLASSES[raw_labels & 0xFFFF]
 
@@ -50,7 +55,7 @@ def classes_of(raw_labels):
 FEW_BEAMS, COLUMNS_OF_FEW_BEAMS = 16, 1536
 
 
-def _beams_by_step(sensor, usual_rows):
+def _beams_by_step(sensor: dict[str, Any], usual_rows: int) -> float:
     """Beams that evenly spaced ones would be if they lay as close as most of the sensor's do."""
     rings, beams = int(sensor["rings"]), sensor.get("beam_elevations_deg") or []
     if len(beams) < 2:
@@ -59,7 +64,7 @@ def _beams_by_step(sensor, usual_rows):
     return max(rings, min((sensor["fov_up_deg"] - sensor["fov_down_deg"]) / step, usual_rows))
 
 
-def image_rows(sensor, usual_rows):
+def image_rows(sensor: dict[str, Any], usual_rows: int) -> int:
     """Rows of the image of an upright lidar, as the engine chooses them (for_sensor() in
     model_description.cpp): `sensor` as in sensor.yaml, `usual_rows` of the model."""
     rings = rows = int(sensor["rings"])
@@ -68,12 +73,12 @@ def image_rows(sensor, usual_rows):
     return max(1, int(min(rows, 2 * usual_rows) / 8 + 0.5)) * 8
 
 
-def image_columns(image, columns):
+def image_columns(image: ImageModel, columns: int) -> int:
     """As many of `columns` as a lidar of its beams fills."""
     return min(columns, COLUMNS_OF_FEW_BEAMS) if image.beams <= FEW_BEAMS else columns
 
 
-def sensor_image(sequence, default):
+def sensor_image(sequence: Path, default: ImageModel) -> ImageModel:
     """The range image of a sequence: of its sensor.yaml's rings and field of view, in as many rows
     and columns as the engine gives it, or `default`."""
     file = sequence / "sensor.yaml"
@@ -86,7 +91,7 @@ def sensor_image(sequence, default):
     return replace(image, columns=image_columns(image, default.columns))
 
 
-def share_outside(points, image):
+def share_outside(points: np.ndarray, image: ImageModel) -> float:
     """Share of the points (n x 3) above or below the image's field of view."""
     elevation_deg = np.degrees(elevation_rad(points.astype(np.float64)))
     outside = (elevation_deg > image.fov_up_deg) | (elevation_deg < image.fov_down_deg)
@@ -96,7 +101,9 @@ def share_outside(points, image):
 class ScanFiles:
     """The labelled scans of one or more SemanticKITTI folders."""
 
-    def __init__(self, folders, sequences, default_image):
+    def __init__(
+        self, folders: Sequence[str | Path], sequences: Sequence[str], default_image: ImageModel
+    ) -> None:
         """`folder` holds each scan's place in `folders`."""
         self.files, self.images, self.folder = [], [], []
         for place, folder in enumerate(map(Path, folders)):
@@ -114,14 +121,14 @@ class ScanFiles:
         if not self.files:
             raise FileNotFoundError(f"no labelled scan in {folders} (sequences: {sequences or 'all'})")
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.files)
 
-    def read(self, index):
+    def read(self, index: int) -> Scan:
         """Points (n x 3), remission (n) and class (n), without points that cannot be projected."""
         return self.read_instances(index)[:3]
 
-    def read_instances(self, index):
+    def read_instances(self, index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """As `read`, and the instance id (n) of each point, 0 where it has none."""
         scan_file, label_file = self.files[index]
         scan = np.fromfile(scan_file, np.float32)
@@ -134,7 +141,7 @@ class ScanFiles:
         labels = labels[usable]
         return scan[:, :3], scan[:, 3], classes_of(labels), labels >> 16
 
-    def require_field_of_view(self):
+    def require_field_of_view(self) -> None:
         """Raises ValueError where sequences without a sensor.yaml are not of the lidar that the
         configuration's `image` describes, by the first scan of each."""
         looked_at = set()
@@ -154,7 +161,7 @@ class ScanFiles:
                     f"and image.fov_down_deg"
                 )
 
-    def evenly_chosen(self, most):
+    def evenly_chosen(self, most: int) -> Iterator[int]:
         """Indices of at most about `most` scans, as many of each folder as there are."""
         folder = np.array(self.folder)
         places = np.unique(folder)
@@ -163,7 +170,7 @@ class ScanFiles:
             wanted = min(len(members), -(-most // len(places)))
             yield from members[np.linspace(0, len(members) - 1, wanted).astype(int)]
 
-    def trained_for(self):
+    def trained_for(self) -> dict[str, float]:
         """The lidars of the scans, as model.yaml tells them: fewest and most beams, and the field of
         view [degrees] that holds all of theirs."""
         return {
@@ -173,7 +180,7 @@ class ScanFiles:
             "fov_down_deg": min(float(image.fov_down_deg) for image in self.images),
         }
 
-    def class_shares(self, scans=200):
+    def class_shares(self, scans: int = 200) -> np.ndarray:
         """Share of every class among all points, from scans spread evenly over each folder."""
         counts = np.zeros(len(CLASS_NAMES))
         for index in self.evenly_chosen(scans):

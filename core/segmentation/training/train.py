@@ -13,6 +13,7 @@ import math
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -25,7 +26,7 @@ from scans import CLASS_NAMES
 from validation import Confusion, save_curves, save_labelled_images
 
 
-def read_config(file, changes):
+def read_config(file: str | Path, changes: list[str]) -> dict[str, Any]:
     """The configuration with changes of the form `a.b=value`; an unknown name is an error."""
     config = yaml.safe_load(Path(file).read_text())
     for change in changes:
@@ -47,13 +48,13 @@ BEST_HOLDS = ("config", "trained_for", "lidar_height_m", "averaged", "epoch", "h
 class Rate:
     """Learning rate at each step, as a factor of the highest."""
 
-    def __init__(self, settings, steps_per_epoch):
+    def __init__(self, settings: dict[str, Any], steps_per_epoch: int) -> None:
         self.settings = settings
         self.steps_per_epoch = steps_per_epoch
         self.warmup = max(1, round(settings["warmup_epochs"] * steps_per_epoch))
         self.total = settings["epochs"] * steps_per_epoch
 
-    def __call__(self, step):
+    def __call__(self, step: int) -> float:
         if step < self.warmup:
             return (step + 1) / self.warmup
         if self.settings["schedule"] == "exponential":
@@ -62,7 +63,7 @@ class Rate:
         return 0.5 * (1 + math.cos(math.pi * min(1.0, share)))
 
 
-def lidar_height_m(config):
+def lidar_height_m(config: dict[str, Any]) -> float | None:
     """Height above the ground of most lidars of the scans: as configured, else that of the run or
     the model that this run starts from; None where nobody tells."""
     if config.get("lidar_height_m") is not None or not config["start_from"]:
@@ -74,7 +75,7 @@ def lidar_height_m(config):
     return yaml.safe_load(file.read_text()).get("lidar_height_m") if file.exists() else None
 
 
-def precision(config, device):
+def precision(config: dict[str, Any], device: str) -> torch.autocast:
     """A context in which convolutions run in bfloat16, where the configuration says so."""
     reduced = config["optimiser"].get("bfloat16", False)
     return torch.autocast(torch.device(device).type, torch.bfloat16, enabled=reduced)
@@ -83,7 +84,7 @@ def precision(config, device):
 class Run:
     """A training run: network, optimiser, progress, and its files."""
 
-    def __init__(self, config, folder, device):
+    def __init__(self, config: dict[str, Any], folder: Path, device: str) -> None:
         self.config, self.folder, self.device = config, folder, device
         self.lidar_height_m = lidar_height_m(config)
         self.scans = open_scans(config, "train")
@@ -115,7 +116,7 @@ class Run:
         self.shares = self.scans.class_shares()
         self.weights = class_weights(self.shares, config["loss"]["weights"]).to(device)
 
-    def start_from(self, file):
+    def start_from(self, file: str | Path) -> None:
         """Loads the weights of another run's best.pt, or those of a model folder."""
         # Imported here, since a run from random weights needs no ONNX.
         from warm_start import check_description, load_weights
@@ -129,7 +130,7 @@ class Run:
             raise SystemExit(f"start_from: {error}") from None
         self.averaged.load_state_dict(self.network.state_dict())
 
-    def resume(self):
+    def resume(self) -> None:
         file = self.folder / "last.pt"
         if not file.exists():
             if self.config["start_from"]:
@@ -148,7 +149,7 @@ class Run:
             self.lidar_height_m = state.get("lidar_height_m")
         print(f"{file}: goes on after epoch {self.epoch}")
 
-    def save(self):
+    def save(self) -> None:
         state = {
             "config": self.config,
             "trained_for": self.scans.trained_for(),
@@ -166,7 +167,7 @@ class Run:
             best = {key: state[key] for key in BEST_HOLDS}
             write_whole(best, self.folder / "best.pt")
 
-    def average(self):
+    def average(self) -> None:
         """Updates the running mean of the network's weights, over fewer steps at the beginning."""
         wanted = self.config["optimiser"]["averaged_steps"]
         share = 1 / min(wanted, 1 + self.step / 3)
@@ -179,16 +180,16 @@ class Run:
                 else:
                     mean.copy_(now)
 
-    def scores(self, channels):
+    def scores(self, channels: torch.Tensor) -> torch.Tensor:
         with precision(self.config, self.device):
             return self.network(channels).float()
 
-    def loss(self, scores, target):
+    def loss(self, scores: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
         loss = weighted_cross_entropy(scores, target, self.weights)
         share = self.config["loss"]["lovasz"]
         return loss + share * lovasz_softmax(scores, target) if share else loss
 
-    def train_epoch(self):
+    def train_epoch(self) -> float:
         self.network.train()
         self.sampler.epoch = self.epoch
         batches = torch.utils.data.DataLoader(
@@ -211,13 +212,13 @@ class Run:
                 show_progress(self.epoch, done, len(self.sampler), np.mean(losses[-50:]), began)
         return float(np.mean(losses))
 
-    def predict(self, channels):
+    def predict(self, channels: np.ndarray) -> np.ndarray:
         """The most probable class of every pixel, by the averaged weights."""
         image = torch.from_numpy(channels)[None].to(self.device, memory_format=torch.channels_last)
         with torch.no_grad(), precision(self.config, self.device):
             return self.averaged(image).argmax(1)[0].cpu().numpy()
 
-    def validate(self):
+    def validate(self) -> Confusion:
         confusion = Confusion()
         wanted = min(self.config["data"]["validation_scans"], len(self.validation))
         chosen = np.unique(np.linspace(0, len(self.validation) - 1, wanted).astype(int))
@@ -227,19 +228,19 @@ class Run:
         return confusion
 
 
-def write_whole(state, file):
+def write_whole(state: dict[str, Any], file: Path) -> None:
     """Writes atomically: an interrupted run leaves the old file."""
     torch.save(state, file.with_suffix(".part"))
     file.with_suffix(".part").replace(file)
 
 
-def show_progress(epoch, done, total, loss, began):
+def show_progress(epoch: int, done: int, total: int, loss: float, began: float) -> None:
     left = (time.time() - began) / done * (total - done)
     line = f"epoch {epoch + 1}  {done}/{total}  loss {loss:.3f}  {left / 60:.1f} min left"
     print(line, end="\r" if done < total and sys.stdout.isatty() else "\n", flush=True)
 
 
-def read_arguments():
+def read_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -250,7 +251,7 @@ def read_arguments():
     return parser.parse_args()
 
 
-def train(run):
+def train(run: Run) -> None:
     """Begins or resumes the run, and trains it to its end."""
     config, folder = run.config, run.folder
     folder.mkdir(parents=True, exist_ok=True)
@@ -271,7 +272,7 @@ def train(run):
         save_labelled_images(run)
 
 
-def main():
+def main() -> None:
     arguments = read_arguments()
     config = read_config(arguments.config, arguments.set)
     torch.set_num_threads(config["threads"])

@@ -5,7 +5,9 @@ unfolded: each gets the mean and the variance of its convolution's output on tra
 the scale and offset with which the network's output stays the same.
 """
 
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
@@ -21,7 +23,7 @@ from model_folder import CHANNELS, class_names
 SQUARED_LENGTH = 1 / 3
 
 
-def check_description(file, config):
+def check_description(file: str | Path, config: dict[str, Any]) -> None:
     """Raises ValueError when the model's normalisation or classes differ from the configuration."""
     file = Path(file)
     file = (file.parent if file.suffix == ".onnx" else file) / "model.yaml"
@@ -38,7 +40,7 @@ def check_description(file, config):
         raise ValueError(f"{file}: its classes are not those that are trained here")
 
 
-def load_weights(network, file, images):
+def load_weights(network: nn.Module, file: str | Path, images: Iterable[torch.Tensor]) -> None:
     """Gives `network` the weights of `file`: best.pt of a run, or a model folder. `images`:
     iterable of training inputs (n x 5 x rows x columns), for the batch norms of a model folder."""
     file = Path(file)
@@ -53,7 +55,7 @@ def load_weights(network, file, images):
         network.load_state_dict(weights)
 
 
-def _load_onnx(network, file):
+def _load_onnx(network: nn.Module, file: Path) -> dict[str, torch.Tensor]:
     """Copies the tensors of an exported network; returns the biases that folded batch norms left,
     by the convolution's name."""
     graph = onnx.load(str(file)).graph
@@ -96,13 +98,13 @@ def _load_onnx(network, file):
     return offsets
 
 
-def _for_more_inputs(weight, convolution):
+def _for_more_inputs(weight: torch.Tensor, convolution: nn.Conv2d) -> torch.Tensor:
     """The weights of a convolution that reads fewer channels; those of the others are 0."""
     more = convolution.in_channels - weight.shape[1]
     return nn.functional.pad(weight, (0, 0, 0, 0, 0, more)) if more > 0 else weight
 
 
-def _part_of(node_name):
+def _part_of(node_name: str) -> str:
     """Name of the module of a node: /network/encoder.0/conv/Conv is encoder.0.conv; members of an
     nn.Sequential repeat its name, as in /network/head/head.1/Conv."""
     steps = []
@@ -117,13 +119,15 @@ _KINDS = (nn.Conv2d, nn.ConvTranspose2d, nn.BatchNorm2d)
 _BATCH_NORM = ("weight", "bias", "running_mean", "running_var")
 
 
-def _batch_norm_of(convolution):
+def _batch_norm_of(convolution: str) -> str:
     """conv1 is followed by bn1, encoder.0.conv by encoder.0.bn."""
     place, _, name = convolution.rpartition(".")
     return f"{place}.{name.replace('conv', 'bn')}" if place else name.replace("conv", "bn")
 
 
-def _unfold_batch_norms(network, offsets, images):
+def _unfold_batch_norms(
+    network: nn.Module, offsets: dict[str, torch.Tensor], images: Iterable[torch.Tensor]
+) -> None:
     parts = dict(network.named_modules())
     statistics = {name: _Spread() for name in offsets}
     for name, offset in offsets.items():
@@ -150,23 +154,23 @@ def _unfold_batch_norms(network, offsets, images):
 class _Spread:
     """Mean and variance of each channel over all pixels of all images."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.count, self.sum, self.squares = 0, 0, 0
 
-    def add(self, y):
+    def add(self, y: torch.Tensor) -> None:
         y = y.double()
         self.count += y.numel() // y.shape[1]
         self.sum += y.sum((0, 2, 3))
         self.squares += (y * y).sum((0, 2, 3))
 
-    def mean(self):
+    def mean(self) -> torch.Tensor:
         return (self.sum / self.count).float()
 
-    def variance(self):
+    def variance(self) -> torch.Tensor:
         return (self.squares / self.count - (self.sum / self.count) ** 2).clamp(min=0).float()
 
 
-def _normalise(convolution, norm, spread):
+def _normalise(convolution: nn.Module, norm: nn.BatchNorm2d, spread: _Spread) -> None:
     lengths = convolution.weight.data.square().sum((1, 2, 3))
     scale = (SQUARED_LENGTH / lengths.clamp(min=1e-12)).sqrt()
     convolution.weight.data *= scale[:, None, None, None]
