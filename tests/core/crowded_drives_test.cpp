@@ -93,8 +93,8 @@ TEST(CrowdedDrives, FollowASparseLidarThroughDenseTraffic) {
   EXPECT_LE(lost, 3);
 }
 
-/// Without labels the edges and planes of 16 rings are those of vehicles: by these alone it went
-/// astray by metres.
+/// Without labels the edges and planes of 16 rings are those of vehicles, and lead astray by
+/// metres.
 TEST(CrowdedDrives, FollowASparseLidarThroughDenseTrafficWithoutLabels) {
   const SimulationConfig config = dense_traffic(330);
   const Simulation simulation(config);
@@ -186,8 +186,7 @@ double angle_deg(const Eigen::Isometry3d& T) {
   return Eigen::AngleAxisd(T.linear()).angle() * 180.0 / M_PI;
 }
 
-/// The rings' lines on walls come nearer with the lidar: they took its pitch along by a degree and
-/// a half on such a stretch.
+/// The rings' lines on walls come nearer with the lidar, and would take its pitch along.
 TEST(CrowdedDrives, KeepASparseLidarLevel) {
   SimulationConfig config = crowded_street();
   config.seed = 4;
@@ -196,7 +195,7 @@ TEST(CrowdedDrives, KeepASparseLidarLevel) {
   EXPECT_LT(off.translation().norm(), 0.15);
 }
 
-/// What few rings took for a tilt within the sweep added up: to degrees within these scans.
+/// What few rings take for a tilt within the sweep must not add up from scan to scan.
 TEST(CrowdedDrives, KeepARollingSparseLidarLevel) {
   SimulationConfig config = crowded_street();
   config.seed = 29;
@@ -207,8 +206,8 @@ TEST(CrowdedDrives, KeepARollingSparseLidarLevel) {
   EXPECT_LT(off.translation().norm(), 0.4);
 }
 
-/// The nearest points of a young map lie along one sweep of a beam: 64 rings 0.7 degrees apart
-/// began tilted by 0.06 degrees, and 32 that nobody numbers by 0.6.
+/// The nearest points of a young map lie along one sweep of a beam, which says nothing of a tilt
+/// across it.
 TEST(CrowdedDrives, BeginLevelWhateverTheLidar) {
   SimulationConfig config = crowded_street();
   config.seed = 604;
@@ -227,8 +226,7 @@ TEST(CrowdedDrives, BeginLevelWhateverTheLidar) {
   EXPECT_LT(irregular_off_deg, 0.3);
 }
 
-/// Two bent first scans agree on half of the way, too, where traffic drives along: one of five such
-/// drives began 0.4 to 1.4 m off.
+/// Two bent first scans agree on half of the way, too, where traffic drives along.
 TEST(CrowdedDrives, BeginRightWhileScansRoll) {
   for (const std::uint64_t seed : {105, 203, 211}) {
     SimulationConfig config = crowded_street();
@@ -272,8 +270,7 @@ TEST(CrowdedDrives, ARestartInTrafficWithoutLabelsFindsWhereItHasDriven) {
 }
 
 /// Scans are missed while the network is made ready for the lidar that was told, and the lidar
-/// drives on at 12 m/s: a mapper made anew looked for it where it was last, in the few voxels that
-/// it had.
+/// drives on at 12 m/s: it is not where it was last, in the few voxels that the map has.
 TEST(CrowdedDrives, GoOnInMotionWithALidarThatIsToldLate) {
   SimulationConfig config = crowded_street();
   config.seed = 71;

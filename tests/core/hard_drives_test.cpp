@@ -102,7 +102,7 @@ TEST(HardDrives, RollingScansAreFollowedWhateverInstantTheStampIs) {
   }
 }
 
-/// Turns that begin within a sweep: taken for constant, they were off by up to a degree.
+/// Turns that begin within a sweep: taken for constant, they are off by up to a degree.
 TEST(HardDrives, TurnsThatChangeWithinARollingSweepAreFollowed) {
   SimulationConfig config = yard(LidarMotion::hard_turns, true, 110);
   config.plan = simulation::crowded_avenue();

@@ -102,7 +102,7 @@ TEST_P(OverTransport, FilteredReadersGetTheirTilesOnly) {
   expect_region(reader, 2);
 }
 
-// With the filters at work in the writer, Fast DDS crashed here within a second.
+// With the filters at work in the writer, Fast DDS 2.9 crashes here within a second.
 TEST_P(OverTransport, OutlivesFilteredReadersThatComeAndGo) {
   const auto topic = Topics::in("stillmap").tile_index;
   const ContentFilter filter{.expression = "tile_x BETWEEN %0 AND %1", .parameters = {"-2", "1"}};

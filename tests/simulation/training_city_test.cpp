@@ -88,7 +88,7 @@ TEST(TrainingSequence, ScansAreFarApartAndAsManyAsWanted) {
   }
 }
 
-/// Turns of 3.75 degrees at a time moved a low lidar's poses by a degree.
+/// Turns of 3.75 degrees at a time would turn a low lidar's poses by a degree.
 TEST(AnySequence, TurnsAsAVehicleDoes) {
   const Simulation sequence(any_sequence(608, hdl_64e()));
   const auto turn_rad = [&](int k) {
