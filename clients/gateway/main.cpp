@@ -145,9 +145,9 @@ void add_options(stillmap::cli::CommandHandle command, Arguments& arguments) {
       .one_at_a_time();
   command.flag("--control", arguments.gateway.services.with_control,
                "Offer the services that change, save or replace the map, too");
-  command.option("--page", arguments.page,
-                 "Folder of the page, instead of the one that came along");
-  command.flag("--no-page", arguments.no_page, "Foxglove's protocol only");
+  const stillmap::cli::OptionHandle page = command.option(
+      "--page", arguments.page, "Folder of the page, instead of the one that came along");
+  command.flag("--no-page", arguments.no_page, "Foxglove's protocol only").excludes(page);
   const auto add_topic = [&](const char* option, std::string& topic, const char* whose) {
     command.option(option, topic, std::string(whose) + " topic")
         .corrected(stillmap::to_topic_name)

@@ -136,6 +136,27 @@ TEST_F(HelpTest, WhatSaysNothingOfALiveTopicIsRefused) {
   }
 }
 
+TEST_F(HelpTest, AMapFileThatIsNotThereIsNamedAlikeByAll) {
+  const std::string file = path("none.stillmap");
+  for (const std::string& command :
+       {"map-info " + file, "map-check " + file, "sessions " + file, "removed " + file,
+        "traversable " + file, "octomap --map " + file, "map-export -o x.ply " + file,
+        "plan --from 0,0 --to 1,1 --map " + file, "nearest --to 1 0 --map " + file,
+        "check-path --path 0 0 1 0 --map " + file, "evaluate traversable --map " + file,
+        "evaluate map --truth x --map " + file, "localize " + file + " drive",
+        "merge " + file + " other --out " + path("both.stillmap")}) {
+    const ProcessResult result = run(command);
+    EXPECT_EQ(result.exit_code, 2) << command;
+    EXPECT_THAT(result.err, HasSubstr("none.stillmap: is not there; name a map file")) << command;
+  }
+}
+
+TEST_F(HelpTest, CloudsToBeLabelledArePlyFiles) {
+  const ProcessResult result = run("dataset aggregate city cloud.txt");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("'cloud.txt' must end in .ply"));
+}
+
 TEST_F(HelpTest, LoadSaysWhenTheRunningMapIsNotSaved) {
   EXPECT_THAT(run("load --help").out, HasSubstr("what was saved there last"));
 }

@@ -114,7 +114,7 @@ void add_dataset_aggregate_command(CommandHandle dataset, Action& action) {
   CommandHandle command =
       dataset.command("aggregate", "Merge the scans of a sequence into one cloud to be labelled");
   command.option("SEQUENCE", arguments->sequence, "A SemanticKITTI sequence with poses").required();
-  command.option("OUT", arguments->out, "The cloud, a .ply file").required();
+  command.option("OUT", arguments->out, "The cloud, FILE.ply").ends_in(".ply").required();
   command.option("--from", merge.first, "Number of the first scan").with_default();
   command.option("--to", merge.last, "Number of the last scan");
   command.option("--every", merge.every, "Every n-th scan of these").above_zero().with_default();

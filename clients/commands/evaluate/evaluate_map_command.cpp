@@ -158,12 +158,9 @@ std::string describe(const evaluation::MapCleaningScore& score) {
 
 ExitCode run(const EvaluateMapArguments& arguments) {
   end_cleanly_when_stopped();
-  if (!std::filesystem::exists(arguments.map)) {
-    throw DatasetError(arguments.map, "does not exist; 'stillmap map' writes map files");
-  }
+  const SavedMap map = read_map_file(arguments.map);
   const ScanDataset dataset(arguments.truth);
   require_semantic_kitti_labels(dataset);
-  const SavedMap map = read_map_file(arguments.map);
   const evaluation::MapTruth truth =
       true_map(arguments, dataset, poses_for_truth(arguments, dataset, map));
   const evaluation::MapCleaningScore score =

@@ -1,4 +1,3 @@
-#include <filesystem>
 #include <iostream>
 #include <memory>
 
@@ -9,7 +8,6 @@
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "config/loaders/robot_profile.hpp"
-#include "core/dataset/dataset_error.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/traversability/traversability_map.hpp"
 
@@ -73,9 +71,6 @@ std::string describe(const evaluation::TraversabilityScore& score, double cell_m
 ExitCode run(const EvaluateTraversableArguments& arguments) {
   end_cleanly_when_stopped();
   const RobotProfile profile = load_robot_profile(arguments.profile);
-  if (!std::filesystem::exists(arguments.map)) {
-    throw DatasetError(arguments.map, "does not exist; 'stillmap map' writes map files");
-  }
   const SavedMap map = read_map_file(arguments.map);
   const simulation::SimulationConfig config = simulation_config(arguments.simulation);
   // The map's frame is the lidar's at the first scan, or that of the robot with its mount.

@@ -3,7 +3,6 @@
 #include <iostream>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -63,8 +62,6 @@ struct SearchableMap {
 };
 
 SearchableMap load_map(const std::string& file) {
-  if (!is_map_file(file))
-    throw std::invalid_argument(file + " is no map file: 'stillmap map' and a server write them");
   SearchableMap map;
   const auto load_began = Clock::now();
   map.saved = read_map_file(file);

@@ -11,7 +11,6 @@
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "config/loaders/robot_profile.hpp"
-#include "core/dataset/dataset_error.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/picture/traversability_picture.hpp"
 
@@ -151,9 +150,6 @@ ExitCode plan_on_file(const PlanArguments& arguments) {
         "a server's map");
   }
   PlanTask task = task_of(arguments);
-  if (!std::filesystem::exists(arguments.map)) {
-    throw DatasetError(arguments.map, "does not exist; 'stillmap map' writes map files");
-  }
   const SavedMap map = read_map_file(arguments.map);
   if (!task.from) {
     throw std::invalid_argument("--from: a stored map has no robot; give x,y or x,y,heading");

@@ -213,9 +213,6 @@ OccupancyMap open_map(const OctomapArguments& arguments) {
     }
     return OccupancyMap(read_octomap_file(file));
   }
-  if (!std::filesystem::exists(file)) {
-    throw MapFileError(file, "does not exist; 'stillmap map' writes map files");
-  }
   OccupancyConfig config;
   if (arguments.resolution_m != 0.0) config.resolution_m = arguments.resolution_m;
   if (!config.faults().empty()) {

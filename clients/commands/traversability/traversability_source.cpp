@@ -1,30 +1,21 @@
 #include "clients/commands/traversability/traversability_source.hpp"
 
-#include <filesystem>
 #include <stdexcept>
 #include <utility>
 
 #include "clients/commands/query/fetch_map.hpp"
 #include "config/loaders/config_error.hpp"
 #include "config/loaders/robot_profile.hpp"
-#include "core/dataset/dataset_error.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 
 namespace stillmap::cli {
 namespace {
 
-SavedMap saved_map(const std::string& file) {
-  if (!std::filesystem::exists(file)) {
-    throw DatasetError(file, "does not exist; 'stillmap map' writes map files");
-  }
-  return read_map_file(file);
-}
-
 class FileSource final : public TraversabilitySource {
  public:
   explicit FileSource(const TraversabilitySourceArguments& arguments)
       : traversability_({load_robot_profile(arguments.profile)}),
-        map_(saved_map(arguments.map_file)) {
+        map_(read_map_file(arguments.map_file)) {
     update_stats_ = traversability_.update(map_.view);
   }
 

@@ -20,7 +20,9 @@ namespace fs = std::filesystem;
 
 fs::path readable(fs::path file) {
   std::error_code error;
-  if (!fs::exists(file, error)) throw MapFileError(file, "is not there; name a map file");
+  if (!fs::exists(file, error))
+    throw MapFileError(file,
+                       "is not there; name a map file, as the map.stillmap of 'stillmap map'");
   if (!fs::is_regular_file(file, error)) throw MapFileError(file, "is not a file; name a map file");
   if (fs::file_size(file, error) == 0) throw MapFileError(file, "is empty; name a map file");
   if (!std::ifstream(file, std::ios::binary)) {
