@@ -13,15 +13,5 @@ int main(int argc, char** argv) {
                                           "Lidar scans in, poses and a static semantic map out.");
   stillmap::cli::Action action;
   stillmap::cli::add_commands(command_line.root(), action);
-  using enum stillmap::cli::CommandLine::Parsed;
-  switch (command_line.parse(argc, argv)) {
-    case answered:
-      action = [] { return stillmap::cli::ExitCode::ok; };
-      break;
-    case wrong_usage:
-      return static_cast<int>(stillmap::cli::ExitCode::bad_input);
-    case command:
-      break;
-  }
-  return static_cast<int>(stillmap::cli::run_action(action));
+  return stillmap::cli::run_program(command_line, argc, argv, action);
 }

@@ -68,4 +68,16 @@ ExitCode run_action(const Action& action) {
   }
 }
 
+int run_program(CommandLine& command_line, int argc, char** argv, const Action& action) {
+  switch (command_line.parse(argc, argv)) {
+    case CommandLine::Parsed::wrong_usage:
+      return static_cast<int>(ExitCode::bad_input);
+    case CommandLine::Parsed::answered:
+      return static_cast<int>(run_action([] { return ExitCode::ok; }));
+    case CommandLine::Parsed::command:
+      break;
+  }
+  return static_cast<int>(run_action(action));
+}
+
 }  // namespace stillmap::cli

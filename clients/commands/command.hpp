@@ -100,4 +100,9 @@ void add_security_check_command(CommandHandle security, Action& action);
 /// Runs the action; an exception becomes a line on stderr and its exit code.
 [[nodiscard]] ExitCode run_action(const Action& action);
 
+/// Parses the command line, then runs `action`, which that may have set, unless help or version was
+/// asked for. Returns the exit code of the program.
+[[nodiscard]] int run_program(CommandLine& command_line, int argc, char** argv,
+                              const Action& action);
+
 }  // namespace stillmap::cli

@@ -183,14 +183,5 @@ int main(int argc, char** argv) {
       "stillmap-gateway", STILLMAP_VERSION,
       "A server's map, poses and scans in browsers: a page of its own, Foxglove and Lichtblick.");
   add_options(command_line.root(), arguments);
-  using enum stillmap::cli::CommandLine::Parsed;
-  switch (command_line.parse(argc, argv)) {
-    case answered:
-      return static_cast<int>(ExitCode::ok);
-    case wrong_usage:
-      return static_cast<int>(ExitCode::bad_input);
-    case command:
-      break;
-  }
-  return static_cast<int>(stillmap::cli::run_action([&] { return run(arguments); }));
+  return stillmap::cli::run_program(command_line, argc, argv, [&] { return run(arguments); });
 }

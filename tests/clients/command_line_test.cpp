@@ -3,11 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <iostream>
 #include <limits>
+#include <streambuf>
 #include <string>
 #include <vector>
 
 #include "clients/commands/arguments/mount_arguments.hpp"
+#include "clients/commands/command.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -151,6 +154,30 @@ TEST(CommandLine, NamesTheVariableThatAWrongValueCameFrom) {
                                            "STILLMAP_TEST_DOMAIN=11"));
   EXPECT_THAT(fault_of({"map", "--domain", "12"}), Not(HasSubstr("environment")));
   unsetenv("STILLMAP_TEST_DOMAIN");
+}
+
+/// As of a full disk.
+class NoRoom : public std::streambuf {
+ protected:
+  int overflow(int /*byte*/) override { return traits_type::eof(); }
+  int sync() override { return -1; }
+};
+
+TEST(Program, FailsWhereItsHelpCannotBeWritten) {
+  NoRoom full;
+  std::streambuf* const stdout_before = std::cout.rdbuf(&full);
+  CommandLine line("program", "1", "help");
+  std::vector<std::string> words{"program", "--help"};
+  std::vector<char*> argv{words[0].data(), words[1].data()};
+  bool was_run = false;
+  const int exit_code = run_program(line, 2, argv.data(), [&] {
+    was_run = true;
+    return ExitCode::ok;
+  });
+  std::cout.rdbuf(stdout_before);
+  std::cout.clear();
+  EXPECT_EQ(exit_code, static_cast<int>(ExitCode::failed));
+  EXPECT_FALSE(was_run);
 }
 
 TEST(FrameOption, GoesWithoutItsFirstSlash) {

@@ -199,6 +199,5 @@ int main(int argc, char** argv) {
   root.option("--busy-ms", arguments.busy_ms, "Take so long for each sample");
   root.flag("--poses,!--no-poses", arguments.with_poses, "Take poses, too (default)");
   stillmap::cli::add_client_options(root, arguments.client);
-  if (line.parse(argc, argv) != stillmap::cli::CommandLine::Parsed::command) return 2;
-  return static_cast<int>(stillmap::cli::run_action([&] { return stillmap::watch(arguments); }));
+  return stillmap::cli::run_program(line, argc, argv, [&] { return stillmap::watch(arguments); });
 }

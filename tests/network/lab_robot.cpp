@@ -80,6 +80,5 @@ int main(int argc, char** argv) {
   root.option("--scans", arguments.scans, "Scans to publish").required();
   root.option("--rate", arguments.rate_hz, "Scans a second").above_zero();
   stillmap::cli::add_client_options(root, arguments.client);
-  if (line.parse(argc, argv) != stillmap::cli::CommandLine::Parsed::command) return 2;
-  return static_cast<int>(stillmap::cli::run_action([&] { return stillmap::drive(arguments); }));
+  return stillmap::cli::run_program(line, argc, argv, [&] { return stillmap::drive(arguments); });
 }
