@@ -185,6 +185,14 @@ void add_server_options(CLI::App& program, ServerArguments& server) {
                            "latest: drop scans that are too many; every: let the sender wait");
 }
 
+/// What CLI11 says, but of words that mean nothing, which it names last first.
+std::string describe_fault(const CLI::App* program, const CLI::Error& fault) {
+  const bool are_unknown = fault.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
+  return (are_unknown ? "not expected here: " + CLI::detail::join(program->remaining(), " ")
+                      : std::string(fault.what())) +
+         "\nRun with --help for more information.\n";
+}
+
 /// The first option that does not exist but is written much as one that does: that one.
 std::string meant_option(const CLI::App& program, std::span<char* const> words) {
   std::vector<std::string> known;
@@ -206,6 +214,7 @@ Arguments read_arguments(int argc, char** argv) {
                    "stillmap-server"};
   program.set_version_flag("--version", std::string("stillmap-server ") + STILLMAP_VERSION);
   program.footer(footer);
+  program.failure_message(describe_fault);
   std::string config_file;
   std::string checked_file;
   ServerArguments server;

@@ -282,7 +282,8 @@ TEST_F(OperationTest, ChecksAConfigurationWithoutStarting) {
 TEST_F(OperationTest, NamesTheOptionThatWasMeant) {
   BackgroundProcess server(stillmap_server_program() + " --deliver every", folder_ / "log");
   EXPECT_EQ(server.wait(), 2);
-  EXPECT_THAT(content("log"), HasSubstr("Did you mean '--delivery'?"));
+  EXPECT_THAT(content("log"), AllOf(HasSubstr("not expected here: --deliver every\n"),
+                                    HasSubstr("Did you mean '--delivery'?")));
 }
 
 TEST_F(OperationTest, LogsByLevelAndForTheJournalWithoutASecondClock) {
