@@ -1,6 +1,7 @@
 #include "clients/doctor/collect_snapshot.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <thread>
 
@@ -151,8 +152,12 @@ SystemSnapshot collect_snapshot(const DoctorOptions& options) {
       .frames = {},
       .host = read_host_facts(options.host_root),
       .granted_buffer_bytes = dds::granted_socket_buffer_bytes(options.dds.socket_buffer_bytes)};
-  // The machine was read before this participant adds its own ports and segments.
+  // The machine was read before this participant adds its own ports and segments; what it has
+  // removed needs no advice.
   dds::Participant participant(named(options.dds));
+  std::erase_if(snapshot.host.segments, [&](const dds::SharedMemorySegment& segment) {
+    return !std::filesystem::exists(options.host_root / "dev/shm" / segment.name);
+  });
   // A discovery server tells of nobody who has nothing for us.
   const StatusClient asks_for_status(participant,
                                      dds::services::get_status.in(options.server_name));

@@ -32,7 +32,9 @@ std::string closest_name(std::string_view written, std::span<const std::string> 
   constexpr std::size_t max_name_length = 64;
   if (written.size() > max_name_length) return {};
   std::string closest;
-  std::size_t best = written.size() / 3 + 2;
+  // Another word of three or four letters is often two edits away.
+  constexpr std::size_t short_word = 4;
+  std::size_t best = written.size() <= short_word ? 2 : written.size() / 3 + 2;
   for (const std::string& name : known) {
     const bool unit_missing = name.starts_with(std::string(written) + '_');
     const std::size_t edits = unit_missing ? 1 : edits_between(written, name);

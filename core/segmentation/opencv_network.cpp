@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <new>
 #include <opencv2/dnn.hpp>
 #include <string>
 #include <vector>
@@ -17,6 +18,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// That is no fault of the model: it may work when the program is started again.
+void rethrow_if_out_of_memory(const cv::Exception& error) {
+  if (error.code == cv::Error::StsNoMem) throw std::bad_alloc();
+}
+
 cv::dnn::Net read_with_opencv(const fs::path& file) {
   try {
     cv::dnn::Net net = cv::dnn::readNetFromONNX(file.string());
@@ -25,6 +31,7 @@ cv::dnn::Net read_with_opencv(const fs::path& file) {
     net.setPreferableTarget(cv::dnn::DNN_TARGET_CPU);
     return net;
   } catch (const cv::Exception& error) {
+    rethrow_if_out_of_memory(error);
     throw ModelError(file,
                      "is not an ONNX network that OpenCV can read (truncated, damaged, or "
                      "with an operator that it does not know): " +
@@ -73,6 +80,7 @@ void OpenCvNetwork::State::try_once(const ModelDescription& model) {
   try {
     output = forward(input);
   } catch (const cv::Exception& error) {
+    rethrow_if_out_of_memory(error);
     throw ModelError(model.network_file,
                      "does not run on an input of " + shape_text(input_shape) +
                          " (1 x 5 x rows x columns of its description): " + error.err);

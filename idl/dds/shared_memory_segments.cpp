@@ -19,7 +19,8 @@ namespace fs = std::filesystem;
 // A file beside the segment, which the living process holds locked: "_el" by its owner, "_sl" by
 // those who use it.
 bool is_locked(const fs::path& lock_file) {
-  const int descriptor = ::open(lock_file.c_str(), O_RDONLY | O_CLOEXEC);
+  // Whatever somebody else put there under this name: without waiting for it.
+  const int descriptor = ::open(lock_file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
   // What cannot be looked at may be alive.
   if (descriptor < 0) return errno != ENOENT;
   const bool was_free = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0;
@@ -54,16 +55,19 @@ void remove_segment(const fs::path& folder, const std::string& name) {
   }
 }
 
-/// The segments that were made so long ago at least. The locks of younger ones are not tried: who
-/// makes one could find it taken.
+/// The segments that were made so long ago at least. The locks of others are not tried, for who
+/// takes one at that moment would find it taken: he may be making a younger segment, or coming to
+/// have the port of somebody dead.
 std::vector<SharedMemorySegment> segments_of_age(const fs::path& folder,
-                                                 std::chrono::seconds min_age) {
+                                                 std::chrono::seconds min_age,
+                                                 StaleSegments which) {
   std::vector<SharedMemorySegment> segments;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
     struct stat facts {};
     if (!is_segment_name(name) || ::stat(entry.path().c_str(), &facts) != 0) continue;
+    if (which == StaleSegments::without_ports && is_port_name(name)) continue;
     const std::chrono::seconds age = age_of(facts);
     if (age < min_age) continue;
     segments.push_back({.name = name,
@@ -78,15 +82,14 @@ std::vector<SharedMemorySegment> segments_of_age(const fs::path& folder,
 }  // namespace
 
 std::vector<SharedMemorySegment> shared_memory_segments(const fs::path& folder) {
-  return segments_of_age(folder, std::chrono::seconds(0));
+  return segments_of_age(folder, std::chrono::seconds(0), StaleSegments::all);
 }
 
 int remove_stale_segments(const fs::path& folder, std::chrono::seconds min_age,
                           StaleSegments which) {
   int removed = 0;
-  for (const SharedMemorySegment& segment : segments_of_age(folder, min_age)) {
+  for (const SharedMemorySegment& segment : segments_of_age(folder, min_age, which)) {
     if (!segment.is_stale) continue;
-    if (which == StaleSegments::without_ports && is_port_name(segment.name)) continue;
     remove_segment(folder, segment.name);
     if (!fs::exists(folder / segment.name)) ++removed;
   }

@@ -131,6 +131,8 @@ TEST(CommandLine, NamesWhatWasMeant) {
   EXPECT_THAT(fault_of({"map", "--scael", "2"}), HasSubstr("Did you mean '--scale'?"));
   EXPECT_THAT(fault_of({"map", "--scales=2"}), HasSubstr("Did you mean '--scale'?"));
   for (const std::vector<std::string>& words : {std::vector<std::string>{"segment"},
+                                                {"top"},
+                                                {"simulate", "--gpu"},
                                                 {},
                                                 {"map", "--width", "2"},
                                                 {"map", "--other"},

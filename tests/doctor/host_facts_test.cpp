@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/file.h>
+#include <sys/inotify.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "clients/doctor/domain_scan.hpp"
@@ -98,6 +100,25 @@ TEST_F(HostFactsTest, TellSegmentsOfTheDeadFromThoseOfTheLiving) {
   EXPECT_FALSE(exists("dev/shm/fastrtps_port7410"));
   EXPECT_FALSE(exists("dev/shm/fastrtps_0123456789abcdef_el"));
   EXPECT_TRUE(exists("dev/shm/sem.other"));
+}
+
+TEST_F(HostFactsTest, LocksOfPortsAreNotTriedWhereThoseStay) {
+  write("dev/shm/fastrtps_port7410", "");
+  write("dev/shm/fastrtps_port7410_el", "");
+  const int watch = ::inotify_init1(IN_NONBLOCK);
+  ASSERT_GE(::inotify_add_watch(watch, (root_ / "dev/shm/fastrtps_port7410_el").c_str(), IN_OPEN),
+            0);
+  (void)dds::remove_stale_segments(root_ / "dev/shm", 0s, dds::StaleSegments::without_ports);
+  inotify_event opened{};
+  EXPECT_LT(::read(watch, &opened, sizeof opened), 0) << "who takes the port finds it taken";
+  ::close(watch);
+}
+
+TEST_F(HostFactsTest, ALockThatIsAPipeHoldsNobodyUp) {
+  const fs::path lock = root_ / "dev/shm/fastrtps_0123456789abcdef_el";
+  fs::remove(lock);
+  ASSERT_EQ(::mkfifo(lock.c_str(), 0600), 0);
+  EXPECT_EQ(facts().segments.size(), 1U);
 }
 
 TEST_F(HostFactsTest, ASegmentFromBeforeTheClockWasSetBackIsAsNewAsCanBe) {

@@ -35,6 +35,7 @@ class LeftSegment {
   LeftSegment& operator=(const LeftSegment&) = delete;
 
   [[nodiscard]] bool is_there() const { return fs::exists(file_) && fs::exists(lock_); }
+  [[nodiscard]] bool is_gone() const { return !fs::exists(file_) && !fs::exists(lock_); }
   [[nodiscard]] const fs::path& lock() const { return lock_; }
 
  private:
@@ -47,7 +48,7 @@ TEST(StaleSegments, OfKilledProcessesGoWhenTheNextOneStarts) {
   const int descriptor = ::open(held.lock().c_str(), O_RDONLY);
   ASSERT_EQ(::flock(descriptor, LOCK_EX | LOCK_NB), 0);
   const Participant participant(loopback(true));
-  EXPECT_FALSE(old.is_there());
+  EXPECT_TRUE(old.is_gone());
   EXPECT_TRUE(young.is_there()) << "it may not be locked yet";
   EXPECT_TRUE(held.is_there()) << "its process lives";
   ::close(descriptor);

@@ -207,11 +207,15 @@ std::uint64_t voxel_count(const Selection& from, std::span<const std::size_t> ti
   return count;
 }
 
-/// Where the voxels of these tiles lie, map frame [m].
+/// Where the voxels of these tiles lie that may be in the region, map frame [m].
 Eigen::AlignedBox3f bounds_map(const Selection& from, std::span<const std::size_t> tiles) {
   Eigen::AlignedBox3f bounds;
   for (const std::size_t i : tiles) bounds.extend(from.tiles[i]->info.bounds_map);
-  return bounds;
+  // A cell more on each side: its ends may be rounded inwards.
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(from.query.resolution_m);
+  const Eigen::AlignedBox3d& region = from.region.bounds_map();
+  return bounds.intersection(
+      Eigen::AlignedBox3d(region.min() - margin, region.max() + margin).cast<float>());
 }
 
 /// The cells of one strip of a coarser answer, merged from the tiles that reach into it.
