@@ -34,7 +34,27 @@ struct RingSpacing {
   std::size_t half_window = 5;
   /// A surface is grazed where both steps on it are longer than this share of the range, squared.
   float grazing_share2 = 0.0002F;
+  /// Many single rays do not return, so that neighbours are unevenly far apart.
+  bool is_uneven = false;
 };
+
+/// Whether a fifth of the steps along a ring leave out some rays: simulators drop half of them at
+/// random. Real lidars lose rays one after the other, towards the sky or on dark paint, which are
+/// few gaps (a VLP-16's share is 0.02 to 0.07).
+bool has_many_gaps(std::span<const Eigen::Vector3f> ring, float step_rad) {
+  // A longer one is no drop; one that is not round the lidar's z tells that this is no ring.
+  constexpr float min_gap_steps = 1.5F, max_gap_steps = 8.0F;
+  constexpr float max_rise_share = 0.3F;
+  constexpr std::size_t share_of_gaps = 5;
+  std::size_t gaps = 0;
+  for (std::size_t i = 1; i < ring.size(); ++i) {
+    const Eigen::Vector3f before = ring[i - 1].normalized(), here = ring[i].normalized();
+    const float sine = before.cross(here).norm();
+    const bool is_gap = sine > min_gap_steps * step_rad && sine < max_gap_steps * step_rad;
+    gaps += is_gap && std::abs(here.z() - before.z()) < max_rise_share * sine ? 1 : 0;
+  }
+  return share_of_gaps * gaps > ring.size();
+}
 
 /// Fewer neighbours where rays are farther apart: what ten of them span is no one surface, and a
 /// flat wall seen at an angle, whose points lie the farther apart the farther they are, bends as an
@@ -53,6 +73,7 @@ RingSpacing spacing_of(std::span<const Eigen::Vector3f> ring) {
     return 0.5F * static_cast<float>(neighbours * (neighbours + 1)) * step_rad;
   };
   RingSpacing spacing;
+  spacing.is_uneven = has_many_gaps(ring, step_rad);
   if (step_rad <= fine_step_rad) return spacing;
   while (step_rad > fine_window_step_rad && spacing.half_window > 1 &&
          angles_rad(spacing.half_window) > max_angles_rad)
@@ -150,6 +171,12 @@ std::vector<bool> unreliable_points(std::span<const Eigen::Vector3f> ring,
   return unreliable;
 }
 
+/// The part of a vector at right angles to another one.
+Eigen::Vector3f across(const Eigen::Vector3f& vector, const Eigen::Vector3f& along) {
+  const float length2 = along.squaredNorm();
+  return length2 > 0.0F ? Eigen::Vector3f(vector - along * (along.dot(vector) / length2)) : vector;
+}
+
 /// ring_curvature() of a ring whose spacing is known.
 std::vector<float> curvature_of(std::span<const Eigen::Vector3f> ring, const RingSpacing& spacing) {
   const std::size_t half_window = spacing.half_window;
@@ -158,8 +185,15 @@ std::vector<float> curvature_of(std::span<const Eigen::Vector3f> ring, const Rin
   const std::vector<bool> unreliable = unreliable_points(ring, spacing);
   for (std::size_t i = half_window; i + half_window < ring.size(); ++i) {
     if (unreliable[i]) continue;
-    Eigen::Vector3f sum = -static_cast<float>(2 * half_window) * ring[i];
-    for (std::size_t k = 1; k <= half_window; ++k) sum += ring[i - k] + ring[i + k];
+    Eigen::Vector3f before = -static_cast<float>(half_window) * ring[i];
+    Eigen::Vector3f after = before;
+    for (std::size_t k = 1; k <= half_window; ++k) {
+      before += ring[i - k];
+      after += ring[i + k];
+    }
+    Eigen::Vector3f sum = before + after;
+    // What is left of it along a straight line is that one side's neighbours are farther away.
+    if (spacing.is_uneven) sum = across(sum, after - before);
     curvature[i] = sum.squaredNorm();
   }
   return curvature;

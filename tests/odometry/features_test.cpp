@@ -139,6 +139,40 @@ TEST(ExtractFeatures, APostIsAnEdgeHoweverFarApartColumnsAre) {
   }
 }
 
+/// Half of the scan's points at random, as simulators drop them.
+Scan half_of(const Scan& scan) {
+  std::mt19937 random(3);
+  Scan half;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    if (random() % 2 == 0) continue;
+    half.points_lidar.push_back(scan.points_lidar[i]);
+    half.ring.push_back(scan.ring[i]);
+  }
+  return half;
+}
+
+TEST(ExtractFeatures, AFlatWallHasNoEdgesWhereHalfOfTheRaysAreDropped) {
+  for (const double step_degrees : {0.2, 0.4, 0.7, 1.0}) {
+    const Scan scan = half_of(ring_scan(
+        -60.0 * degree, 60.0 * degree, [](double azimuth) { return 8.0 / std::cos(azimuth); }, 0,
+        0.0F, step_degrees * degree));
+    const Features features = extract_features(scan, FeatureConfig{});
+    EXPECT_THAT(features.edges, IsEmpty()) << step_degrees;
+    EXPECT_GE(features.planes.size(), 15U) << step_degrees;
+  }
+}
+
+TEST(ExtractFeatures, ACornerIsAnEdgeWhereHalfOfTheRaysAreDropped) {
+  // The corner lies at the azimuth of 0.
+  const auto corner = [](double azimuth) {
+    return 8.0 / (std::cos(azimuth) + std::abs(std::sin(azimuth)));
+  };
+  const Scan scan = half_of(ring_scan(-30.0 * degree, 30.0 * degree, corner));
+  const Features features = extract_features(scan, FeatureConfig{});
+  ASSERT_FALSE(features.edges.empty());
+  for (const std::uint32_t i : features.edges) EXPECT_LT(std::abs(scan.points_lidar[i].y()), 0.2F);
+}
+
 TEST(ExtractFeatures, ShuffledPointsGiveTheSameSets) {
   const Scan scan = room_scan();
   std::vector<std::size_t> order(scan.size());
