@@ -31,6 +31,7 @@ constexpr double clearly_better = 0.6;
 /// A share of numbers that are no metres is noise where it is above this, and none below that.
 constexpr double much_noise = 0.05;
 constexpr double no_noise = 0.01;
+constexpr double mostly_noise = 0.5;
 
 /// The beginning of a file.
 struct Beginning {
@@ -183,7 +184,8 @@ bool is_nuscenes(std::span<const fs::path> names, const std::vector<Beginning>& 
   return relative_to_kitti(*as_nuscenes, *as_kitti) < (is_named ? 1.0 : clearly_better);
 }
 
-/// How points are laid out that are not as KITTI's, and numpy's words that make them so.
+/// How points are laid out that are not as KITTI's, and numpy's words that make them so; none where
+/// these are not known.
 struct OtherLayout {
   std::string in_words;
   std::string conversion;
@@ -191,6 +193,11 @@ struct OtherLayout {
 
 OtherLayout of_floats(std::size_t values) {
   const std::string count = std::to_string(values);
+  if (values == 1) {
+    // As RobotCar's.
+    return {"all x, then all y, all z and all intensities, as float32",
+            "np.fromfile('IN.bin', 'f4').reshape(4, -1).T"};
+  }
   if (values == 3) {
     // Without intensity: 0.
     return {"x y z as float32 without intensity",
@@ -217,13 +224,30 @@ bool are_two_of_three(const std::vector<Beginning>& files) {
   return true;
 }
 
+/// Whether of the values at each place of KITTI's points many are negative, as no intensities are.
+bool have_negatives_everywhere(const std::vector<Beginning>& files) {
+  constexpr std::size_t one_in = 10;
+  std::array<std::size_t, kitti_values> seen{}, negative{};
+  for (const Beginning& file : files) {
+    for (std::size_t i = 0; i < file.scaled.size(); ++i) {
+      if (std::isnan(file.scaled[i])) continue;
+      ++seen[i % kitti_values];
+      negative[i % kitti_values] += file.scaled[i] < 0.0F ? 1 : 0;
+    }
+  }
+  for (std::size_t k = 0; k < kitti_values; ++k)
+    if (one_in * negative[k] < seen[k]) return false;
+  return fits_sizes(files, kitti_bytes);
+}
+
 /// Where most numbers repeat after another number of float32 values than KITTI's.
 std::optional<OtherLayout> other_floats(const std::vector<Beginning>& files,
                                         const Differences& as_kitti) {
   std::optional<std::size_t> best;
   double least = clearly_better;
-  for (const std::size_t values : {3U, 5U, 6U, 7U}) {
+  for (const std::size_t values : {1U, 3U, 5U, 6U, 7U}) {
     if (!fits_sizes(files, values * sizeof(float))) continue;
+    if (values == 1 && !have_negatives_everywhere(files)) continue;
     // Twice six is three of KITTI's points.
     const auto found =
         values == 6 ? differences(files, values) : differences_of_points(files, values);
@@ -238,9 +262,15 @@ std::optional<OtherLayout> other_floats(const std::vector<Beginning>& files,
   return of_floats(*best);
 }
 
-/// Where what would be float32 is noise and, read otherwise, is not.
+bool are_many_values(const std::vector<Beginning>& files) {
+  return std::ranges::any_of(files,
+                             [](const Beginning& file) { return file.scaled.size() >= min_pairs; });
+}
+
+/// Where what would be float32 is noise and, read otherwise, is not, or nearly all of it is.
 std::optional<OtherLayout> other_numbers(const std::vector<Beginning>& files) {
-  if (noise<float>(files, sizeof(float), 1) < much_noise) return std::nullopt;
+  const double noise_share = noise<float>(files, sizeof(float), 1);
+  if (noise_share < much_noise) return std::nullopt;
   if (fits_sizes(files, 4 * sizeof(double)) && noise<double>(files, sizeof(double), 1) < no_noise) {
     return OtherLayout{"x y z intensity as float64", "np.fromfile('IN.bin', 'f8').astype('f4')"};
   }
@@ -254,7 +284,8 @@ std::optional<OtherLayout> other_numbers(const std::vector<Beginning>& files) {
         count + " bytes a point, of which the first are x y z as float32",
         "np.fromfile('IN.bin', 'u1').reshape(-1, " + count + ")[:, :16].copy().view('f4')"};
   }
-  return std::nullopt;
+  if (noise_share < mostly_noise || !are_many_values(files)) return std::nullopt;
+  return OtherLayout{"numbers that are no float32, such as NCLT's, which have 16 bits", {}};
 }
 
 }  // namespace
@@ -267,13 +298,15 @@ BinLayout bin_layout_of(std::span<const fs::path> files) {
   std::optional<OtherLayout> other = other_numbers(beginnings);
   if (!other && as_kitti) other = other_floats(beginnings, *as_kitti);
   if (!other) return BinLayout::kitti;
-  throw DatasetError(files.front(),
-                     "looks like " + other->in_words +
-                         ", not like KITTI's x y z intensity as float32, and would be read as "
-                         "noise; python3 -c \"import numpy as np; a = " +
-                         other->conversion +
-                         "; a.tofile('OUT.bin')\" converts a file whose fourth value is the "
-                         "intensity; .pcd and .ply name their values");
+  const std::string converted =
+      other->conversion.empty()
+          ? "convert them to that"
+          : "python3 -c \"import numpy as np; a = " + other->conversion +
+                "; a.tofile('OUT.bin')\" converts a file whose fourth value is the intensity";
+  throw DatasetError(files.front(), "looks like " + other->in_words +
+                                        ", not like KITTI's x y z intensity as float32, and would "
+                                        "be read as noise; " +
+                                        converted + "; .pcd and .ply name their values");
 }
 
 Scan read_bin(const fs::path& file, BinLayout layout) {

@@ -70,6 +70,18 @@ std::vector<fs::path> scans_in(const fs::path& folder) {
   return sorted(std::move(most));
 }
 
+/// The way out where scans may lie in files of another kind, of which it has any.
+std::string other_files_in(const fs::path& folder) {
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    std::error_code error;
+    const std::string ending = ending_of(entry.path());
+    if (!ending.empty() && fs::is_regular_file(entry.path(), error))
+      return ", but " + ending.substr(0, 40) +
+             "; of scans in these, write x y z intensity as float32 to .bin files (numpy's tofile)";
+  }
+  return {};
+}
+
 std::vector<fs::path> scans_of(const fs::path& path) {
   std::error_code error;
   if (!fs::exists(path, error)) throw DatasetError(path, "no such file or folder; check the path");
@@ -90,9 +102,9 @@ std::vector<fs::path> scans_of(const fs::path& path) {
     throw DatasetError(path, std::string("cannot be read: ") + fault.what());
   }
   if (files.empty()) {
-    throw DatasetError(sequence ? velodyne : path,
-                       "holds no .bin, .pcd or .ply file; give the folder that does, or the one "
-                       "above velodyne/");
+    const fs::path& folder = sequence ? velodyne : path;
+    throw DatasetError(folder, "holds no .bin, .pcd or .ply file" + other_files_in(folder) +
+                                   "; or give the folder that does, or the one above velodyne/");
   }
   return files;
 }

@@ -130,6 +130,30 @@ TEST_F(BinLayoutTest, RefusesRecordsOfOtherNumbers) {
   EXPECT_THAT(fault(bytes), HasSubstr("26 bytes a point"));
 }
 
+// As RobotCar's: x of all points, then y, z and the intensities.
+TEST_F(BinLayoutTest, RefusesColumnsOneAfterTheOther) {
+  const std::vector<float> points = values_of(turn(), 4);
+  std::vector<float> columns;
+  for (std::size_t k = 0; k < 4; ++k)
+    for (std::size_t i = k; i < points.size(); i += 4) columns.push_back(points[i]);
+  EXPECT_THAT(fault(columns), AllOf(HasSubstr("all x, then all y"), HasSubstr("reshape(4, -1).T")));
+}
+
+// As NCLT's: coordinates of 16 bits, intensity and beam of 8.
+TEST_F(BinLayoutTest, RefusesWholeNumbers) {
+  std::vector<std::uint16_t> values;
+  for (const Measured& p : turn()) {
+    for (const float metres : {p.x, p.y, p.z})
+      values.push_back(static_cast<std::uint16_t>((metres + 100.0F) / 0.005F));
+    values.push_back(static_cast<std::uint16_t>(256.0F * p.ring + p.intensity));
+  }
+  EXPECT_THAT(fault(values), AllOf(HasSubstr("no float32"), HasSubstr("NCLT"),
+                                   testing::Not(HasSubstr("python3"))));
+  // Nothing is to be learnt from a scrap.
+  values.resize(20);
+  EXPECT_TRUE(is_kittis(values));
+}
+
 TEST_F(BinLayoutTest, TakesEveryFileOfKittisLayout) {
   for (const float brightest : {1.0F, 255.0F, 0.0F}) {
     std::vector<Measured> points = turn();

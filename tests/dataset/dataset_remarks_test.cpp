@@ -3,6 +3,7 @@
 
 #include <fstream>
 
+#include "core/dataset/dataset_error.hpp"
 #include "core/dataset/kitti_sequence_writer.hpp"
 #include "core/dataset/scan_dataset.hpp"
 #include "tests/dataset/kitti_lidar_scan.hpp"
@@ -69,6 +70,16 @@ TEST(ScanDatasetUnits, ThatCanBeNoMetresAreTold) {
       EXPECT_THAT(remarks, testing::Not(told));
     }
   }
+}
+
+TEST(ScanDataset, SaysWhatBecomesOfFilesOfOtherKinds) {
+  const ScratchFolder folder;
+  const auto fault = [&] {
+    return message_of<DatasetError>([&] { (void)ScanDataset(folder.path()); });
+  };
+  EXPECT_THAT(fault(), testing::Not(HasSubstr("but")));
+  (void)folder.file("0.npy", "numbers");
+  EXPECT_THAT(fault(), HasSubstr("but .npy; of scans in these, write x y z intensity as float32"));
 }
 
 TEST(ScanDataset, KnowsKittisLidarInFilesOfOtherKinds) {
