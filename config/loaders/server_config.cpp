@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 
@@ -223,7 +224,19 @@ bool read_topics(YamlSection section, TopicsConfig& topics) {
   return section.has("points");
 }
 
+/// Three coordinates of fewer than three fields make no points.
+void check_coordinates(YamlSection& section, const PointFieldNames& fields) {
+  std::set<std::string> names;
+  for (const auto* list : {&fields.x, &fields.y, &fields.z})
+    if (!list->empty()) names.insert(coordinate_field(list->front()).name);
+  if (names.size() < 3) section.fault("y", "x, y and z need a field each, no two of them the same");
+}
+
 void read_fields(YamlSection section, PointFieldNames& fields) {
+  section.text_list("x", fields.x);
+  section.text_list("y", fields.y);
+  section.text_list("z", fields.z);
+  check_coordinates(section, fields);
   section.text_list("intensity", fields.intensity);
   section.text_list("ring", fields.ring);
   section.text_list("time", fields.time);

@@ -75,11 +75,24 @@ std::string source_of(const std::string& what, const std::optional<Column>& colu
          std::to_string(8 * field.bytes) + (remark.empty() ? "" : ": " + remark) + ")";
 }
 
+/// The column with the first of these names, negative where it has a "-" in front.
+std::optional<Column> find_coordinate(const CloudContent& cloud,
+                                      const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    const auto [field, sign] = coordinate_field(name);
+    std::optional<Column> column = find_column(cloud, {field});
+    if (!column) continue;
+    for (double& value : column->values) value *= static_cast<double>(sign);
+    return column;
+  }
+  return std::nullopt;
+}
+
 std::vector<Eigen::Vector3f> points_of(const std::filesystem::path& file, const CloudContent& cloud,
                                        const PointFieldNames& names) {
-  const auto x = find_column(cloud, names.x);
-  const auto y = find_column(cloud, names.y);
-  const auto z = find_column(cloud, names.z);
+  const auto x = find_coordinate(cloud, names.x);
+  const auto y = find_coordinate(cloud, names.y);
+  const auto z = find_coordinate(cloud, names.z);
   if (!x || !y || !z) {
     std::string present;
     for (const CloudField& field : cloud.fields) present.append(" ").append(field.name, 0, 40);
@@ -91,6 +104,17 @@ std::vector<Eigen::Vector3f> points_of(const std::filesystem::path& file, const 
     points.emplace_back(Eigen::Vector3d(x->values[i], y->values[i], z->values[i]).cast<float>());
   }
   return points;
+}
+
+/// What is to be said of fields that are those of CARLA's save_to_disk(), where nobody has put
+/// their axes right: a mirrored world maps as well as any, and no scan tells it.
+std::string remark_on_axes(const CloudContent& cloud, const PointFieldNames& names) {
+  if (names.y != PointFieldNames().y) return {};
+  std::string fields;
+  for (const CloudField& field : cloud.fields) fields.append(" ").append(field.name, 0, 40);
+  if (fields != " x y z I" && fields != " x y z CosAngle ObjIdx ObjTag") return {};
+  return "; these fields are CARLA's, whose y points to the right: the map is mirrored, unless "
+         "'input: {fields: {y: [-y]}}' in a --config file says so";
 }
 
 std::vector<float> intensity_of(const std::optional<Column>& intensity) {
@@ -195,8 +219,10 @@ CloudFile read_point_cloud(const std::filesystem::path& file, std::int64_t stamp
   read.scan.ring = whole_numbers<std::uint16_t>(ring);
   read.raw_labels = labels_of(cloud, names);
   const bool is_no_ring = ring && read.scan.ring.empty() && !ring->values.empty();
-  read.format = source_of("intensity", intensity) + ", " + source_of("time", time, times.remark) +
-                ", " + source_of("ring", ring, is_no_ring ? "ignored: not whole numbers" : "");
+  read.format = axes_in_words(names) + source_of("intensity", intensity) + ", " +
+                source_of("time", time, times.remark) + ", " +
+                source_of("ring", ring, is_no_ring ? "ignored: not whole numbers" : "") +
+                remark_on_axes(cloud, names);
   return read;
 }
 

@@ -410,8 +410,13 @@ DatasetFrame ScanDataset::read_as_recorded(std::size_t i) const {
   }
   DatasetFrame frame;
   frame.scan = read_bin(file(i), bin_layout_);
+  if (const Eigen::Matrix3f axes = axes_by(fields_); !axes.isIdentity(0.0F)) {
+    for (Eigen::Vector3f& p : frame.scan.points_lidar) p = axes * p;
+    frame.format = axes_in_words(fields_) + "intensity";
+  }
   if (bin_layout_ == BinLayout::nuscenes)
-    frame.format = "intensity (0 to 255) and ring as nuScenes' files have them, no time";
+    frame.format = axes_in_words(fields_) +
+                   "intensity (0 to 255) and ring as nuScenes' files have them, no time";
   frame.scan.stamp_ns = stamp_ns(i);
   const std::size_t points = frame.scan.size();
   if (const auto labels = beside(i, "labels", ".label"); fs::exists(labels)) {

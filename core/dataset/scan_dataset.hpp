@@ -35,7 +35,8 @@ class ScanDataset {
  public:
   /// Throws DatasetError when there is no scan to be found, or none of some from all over it can be
   /// read, or .bin files are of a layout that is not known.
-  /// `fields`: the names of what .pcd and .ply files have of a point.
+  /// `fields`: the names of what .pcd and .ply files have of a point; of .bin files, whose
+  /// coordinates count as x, y and z, only the axes.
   /// `label_kind`: what the numbers in its labels are; nothing: SemanticKITTI's, and label_census()
   /// tells whether they look like them.
   explicit ScanDataset(const std::filesystem::path& path, std::optional<LabelKind> label_kind = {},

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace stillmap {
@@ -175,6 +176,38 @@ std::string remark(float full_scale) {
 }
 
 }  // namespace
+
+CoordinateField coordinate_field(const std::string& name) {
+  if (name.starts_with('-')) return {name.substr(1), -1.0F};
+  return {name, 1.0F};
+}
+
+Eigen::Matrix3f axes_by(const PointFieldNames& names) {
+  constexpr std::string_view letters = "xyz";
+  const std::array lists{&names.x, &names.y, &names.z};
+  Eigen::Matrix3f axes = Eigen::Matrix3f::Identity();
+  for (int row = 0; row < 3; ++row) {
+    for (const std::string& name : *lists[static_cast<std::size_t>(row)]) {
+      const auto [field, sign] = coordinate_field(name);
+      const auto column = field.size() == 1 ? letters.find(field.front()) : std::string_view::npos;
+      if (column == std::string_view::npos) continue;
+      axes.row(row).setZero();
+      axes(row, static_cast<int>(column)) = sign;
+      break;
+    }
+  }
+  return axes;
+}
+
+std::string axes_in_words(const PointFieldNames& names) {
+  const PointFieldNames own;
+  if (names.x == own.x && names.y == own.y && names.z == own.z) return {};
+  const auto first = [](const std::vector<std::string>& list) {
+    return list.empty() ? std::string() : list.front();
+  };
+  return "x from " + first(names.x) + ", y from " + first(names.y) + ", z from " + first(names.z) +
+         ", ";
+}
 
 PointTimes point_times(std::span<const double> times, TimeType type, std::int64_t stamp_ns) {
   const std::vector<double> going_on =

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -15,6 +16,10 @@ namespace stillmap {
 /// Livox, RoboSense and Nebula. An Ouster's `intensity` counts photons while its `reflectivity` is
 /// calibrated, so that comes first; a Livox's `line` is no ring, as its beams do not keep their
 /// elevation.
+///
+/// A coordinate's name with "-" in front is the negative of that field: the points are to be in a
+/// right-handed frame with x ahead, y to the left and z up, and simulators have others (CARLA: y to
+/// the right; AirSim: y to the right and z down; Unity: y up, z ahead).
 struct PointFieldNames {
   std::vector<std::string> x = {"x"};
   std::vector<std::string> y = {"y"};
@@ -25,6 +30,21 @@ struct PointFieldNames {
                                    "time_stamp", "offset_time", "time_offset"};
   std::vector<std::string> label = {"label"};
 };
+
+/// A field that a coordinate is read from.
+struct CoordinateField {
+  std::string name;
+  /// 1, or -1 where its negative is meant.
+  float sign = 1.0F;
+};
+[[nodiscard]] CoordinateField coordinate_field(const std::string& name);
+
+/// What takes points whose coordinates have no names but their order to the axes that `names` say:
+/// each from the first name that is x, y or z, with or without "-".
+[[nodiscard]] Eigen::Matrix3f axes_by(const PointFieldNames& names);
+
+/// "x from z, y from -x, z from y, ", or nothing where each is its own.
+[[nodiscard]] std::string axes_in_words(const PointFieldNames& names);
 
 /// Number type of a time field.
 enum class TimeType { integer, float32, float64 };

@@ -23,6 +23,8 @@ struct PointColumn {
   FieldType type = FieldType::float32;
   /// As the cloud calls it.
   std::string name;
+  /// Of a coordinate: -1 where its negative is meant.
+  float sign = 1.0F;
 };
 
 /// The checked description of a cloud: every point of every column lies within the data.
@@ -83,9 +85,16 @@ std::optional<PointColumn> find_column(const PointCloud2& cloud,
 }
 
 PointColumn coordinate(const PointCloud2& cloud, const std::vector<std::string>& names) {
-  const auto column = find_column(cloud, names);
-  if (!column) refuse("no_xyz", "there is no field " + names.front() + "; x, y and z are needed");
-  return *column;
+  for (const std::string& name : names) {
+    const auto [field, sign] = coordinate_field(name);
+    std::optional<PointColumn> column = find_column(cloud, {field});
+    if (!column) continue;
+    column->sign = sign;
+    return *column;
+  }
+  refuse("no_xyz", "there is no field " +
+                       coordinate_field(names.empty() ? "" : names.front()).name +
+                       "; x, y and z are needed");
 }
 
 void check_sizes(const PointCloud2& cloud) {
@@ -157,7 +166,7 @@ std::vector<Eigen::Vector3f> read_points(const PointCloud2& cloud, const CloudLa
   std::vector<Eigen::Vector3f> points_lidar(layout.points());
   const auto read_axis = [&](const PointColumn& column, int axis) {
     for_each_value(cloud, layout, column, [&](std::size_t i, auto value) {
-      points_lidar[i][axis] = static_cast<float>(value);
+      points_lidar[i][axis] = column.sign * static_cast<float>(value);
     });
   };
   read_axis(layout.x, 0);
@@ -280,7 +289,7 @@ ScanFromCloud to_scan(const PointCloud2& cloud, const CloudReadOptions& options)
   if (!layout) return {.scan = std::nullopt, .fault = fault, .format = {}};
   PointTimes times = read_time(cloud, *layout, *stamp);
   ReadLabels labels = read_labels(cloud, *layout, options);
-  std::string format = describe(*layout, times, labels);
+  std::string format = axes_in_words(options.fields) + describe(*layout, times, labels);
   return {.scan = Scan{.stamp_ns = *stamp,
                        .points_lidar = read_points(cloud, *layout),
                        .intensity = read_intensity(cloud, *layout, options.intensity_scale),

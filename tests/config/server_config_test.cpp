@@ -82,6 +82,13 @@ static_map: {min_points: 5}
   EXPECT_EQ(config.mapper.static_map.min_points, 5U);
 }
 
+TEST(ServerConfig, ReadsTheAxesOfPoints) {
+  const ServerConfig config = load("input: {fields: {x: [z], y: [-x], z: [y]}}");
+  EXPECT_THAT(config.input.fields.y, ::testing::ElementsAre("-x"));
+  EXPECT_THAT(refusal_of("input: {fields: {y: [-x]}}"), HasSubstr("no two of them the same"));
+  EXPECT_THAT(refusal_of("input: {fields: {y: []}}"), HasSubstr("no two of them the same"));
+}
+
 TEST(ServerConfig, ReadsWhereTheLidarSits) {
   const ServerConfig config = load(
       "frames: {base: base_link, odom: odom}\n"

@@ -72,6 +72,16 @@ TEST(ScanDatasetUnits, ThatCanBeNoMetresAreTold) {
   }
 }
 
+TEST(ScanDataset, TakesCoordinatesOfBinFilesToTheAxesThatNamesSay) {
+  const ScratchFolder folder;
+  (void)sequence_with_times(folder, "0.0\n0.1\n0.2\n");
+  PointFieldNames names;
+  names.y = {"-y"};
+  const ScanDataset dataset(folder.path() / "sequence", {}, names);
+  EXPECT_EQ(dataset.read(0).scan.points_lidar.front(), Eigen::Vector3f(1.0F, -2.0F, 3.0F));
+  EXPECT_THAT(dataset.remarks(), Contains(HasSubstr("y from -y")));
+}
+
 TEST(ScanDataset, SaysWhatBecomesOfFilesOfOtherKinds) {
   const ScratchFolder folder;
   const auto fault = [&] {

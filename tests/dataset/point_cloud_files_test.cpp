@@ -79,6 +79,44 @@ TEST(PointCloudFiles, ReadsAllFieldsAndPassesOverPadding) {
   EXPECT_THAT(cloud.raw_labels, ElementsAre((9U << 16U) | 252U, 40U));
 }
 
+TEST(PointCloudFiles, ReadsCoordinatesByTheirNamesAndSigns) {
+  const ScratchFolder folder;
+  PointFieldNames names;
+  names.x = {"z"};
+  names.y = {"-left", "-x"};
+  names.z = {"y"};
+  const CloudFile cloud = read_point_cloud(folder.file("a.pcd", ascii_pcd), 0, names);
+  EXPECT_THAT(cloud.scan.points_lidar,
+              ElementsAre(Eigen::Vector3f(3, -1, 2), Eigen::Vector3f(-6, 4, -5)));
+  EXPECT_THAT(cloud.format, testing::StartsWith("x from z, y from -left, z from y, intensity"));
+  names.y = {"-left"};
+  EXPECT_THAT(message_of<DatasetError>(
+                  [&] { (void)read_point_cloud(folder.file("a.pcd", ascii_pcd), 0, names); }),
+              HasSubstr("has no fields x, y and z"));
+}
+
+TEST(PointCloudFiles, SaysThatCarlasOwnAreMirrored) {
+  const ScratchFolder folder;
+  const auto format_of = [&](const std::string& properties, const std::string& point,
+                             const PointFieldNames& names = {}) {
+    const std::string text =
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float32 x\n"
+        "property float32 y\nproperty float32 z\n" +
+        properties + "end_header\n" + point + "\n";
+    return read_point_cloud(folder.file("a.ply", text), 0, names).format;
+  };
+  const std::string intensity = "property float32 I\n";
+  const std::string semantic =
+      "property float32 CosAngle\nproperty uint32 ObjIdx\nproperty uint32 ObjTag\n";
+  EXPECT_THAT(format_of(intensity, "1 2 3 0.9"), HasSubstr("the map is mirrored"));
+  EXPECT_THAT(format_of(semantic, "1 2 3 0.5 7 14"), HasSubstr("the map is mirrored"));
+  EXPECT_THAT(format_of("property float32 i\n", "1 2 3 0.9"), testing::Not(HasSubstr("mirrored")));
+  PointFieldNames names;
+  names.y = {"-y"};
+  EXPECT_EQ(format_of(intensity, "1 2 3 0.9", names),
+            "x from x, y from -y, z from z, intensity from I (float32), no time, no ring");
+}
+
 TEST(PointCloudFiles, LeavesLabelsOutThatFloatsHaveRounded) {
   const ScratchFolder folder;
   const auto labels_from = [&](float label) {

@@ -112,6 +112,23 @@ void expect_coordinates_of_type(FieldType type) {
   EXPECT_EQ(back.scan->points_lidar.front(), Eigen::Vector3f(1.0F, 2.0F, 100.0F));
 }
 
+TEST(CloudToScan, ReadsCoordinatesByTheirNamesAndSigns) {
+  CloudReadOptions options;
+  options.fields.x = {"z"};
+  options.fields.y = {"-left", "-x"};
+  options.fields.z = {"y"};
+  const ScanFromCloud read = to_scan(three_points(), options);
+  ASSERT_TRUE(read.scan);
+  EXPECT_THAT(
+      read.scan->points_lidar,
+      ElementsAre(Eigen::Vector3f(3, -1, 2), Eigen::Vector3f(6, -4, 5), Eigen::Vector3f(9, -7, 8)));
+  EXPECT_THAT(read.format, HasSubstr("x from z, y from -left, z from y, "));
+  options.fields.y = {"-left"};
+  EXPECT_THAT(to_scan(three_points(), options).fault.reason, HasSubstr("no field left"));
+  options.fields.y = {};
+  EXPECT_EQ(to_scan(three_points(), options).fault.counter, "no_xyz");
+}
+
 TEST(CloudToScan, ReadsCoordinatesOfEveryType) {
   expect_coordinates_of_type<std::int8_t>(FieldType::int8);
   expect_coordinates_of_type<std::uint8_t>(FieldType::uint8);

@@ -244,6 +244,24 @@ TEST(IntensityScale, AScaleOfItsOwnIsKeptWhereItFits) {
   EXPECT_THAT(scale.apply(values), IsEmpty());
 }
 
+TEST(AxesBy, NamesTurnsAndMirrorsPoints) {
+  EXPECT_TRUE(axes_by({}).isIdentity(0.0F));
+  EXPECT_TRUE(axes_in_words({}).empty());
+  PointFieldNames unity;
+  unity.x = {"Z", "z"};
+  unity.y = {"-x"};
+  unity.z = {"y"};
+  // A metre to the right, two up, three ahead.
+  EXPECT_EQ(axes_by(unity) * Eigen::Vector3f(1.0F, 2.0F, 3.0F), Eigen::Vector3f(3.0F, -1.0F, 2.0F));
+  EXPECT_EQ(axes_in_words(unity), "x from Z, y from -x, z from y, ");
+  EXPECT_EQ(coordinate_field("-y").name, "y");
+  EXPECT_EQ(coordinate_field("-y").sign, -1.0F);
+  // Names of files that have none say nothing of those that go by their order.
+  PointFieldNames other;
+  other.x = {"-forward", "", "-"};
+  EXPECT_TRUE(axes_by(other).isIdentity(0.0F));
+}
+
 TEST(PointTimes, OfACounterThatBeginsAnewWithinTheScanGoOn) {
   constexpr double full_turn = 4294967296.0;
   constexpr int points = 1000;
