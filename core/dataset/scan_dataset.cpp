@@ -16,6 +16,7 @@
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/kitti_sequence_writer.hpp"
 #include "core/dataset/point_cloud_files.hpp"
+#include "core/dataset/scan_remarks.hpp"
 #include "core/lidar/measured_elevation.hpp"
 #include "core/lidar/point_fields.hpp"
 #include "core/lidar/ring_numbering.hpp"
@@ -363,6 +364,7 @@ std::vector<std::string> ScanDataset::remarks() const {
         "half of the points lie more than 150 m away: coordinates are taken for "
         "metres in the lidar's frame, and these may be centimetres or millimetres, or in "
         "the frame of a map");
+  for (std::string& remark : remarks_on_scans(*this)) remarks.push_back(std::move(remark));
   return remarks;
 }
 
