@@ -238,6 +238,31 @@ std::vector<double> shown_rings(const Scan& scan) {
   return elevations;
 }
 
+/// Of a built-in sensor, the beam nearest to a point's elevation is its ring: where a ring lies
+/// between two of them, as that of a simulated lidar of nearly this field of view may, its points
+/// would be shared out.
+bool are_near_their_beams(const std::vector<double>& elevations, const SensorModel& sensor) {
+  constexpr double max_share_of_step = 0.35;
+  const double step = (sensor.beam_elevation(0) - sensor.beam_elevation(sensor.rings - 1)) /
+                      static_cast<double>(sensor.rings - 1);
+  return std::ranges::all_of(elevations, [&](double elevation) {
+    double nearest = INFINITY;
+    for (int ring = 0; ring < sensor.rings; ++ring)
+      nearest = std::min(nearest, std::abs(elevation - sensor.beam_elevation(ring)));
+    return nearest < max_share_of_step * step;
+  });
+}
+
+/// The sensor of rings that a scan shows.
+std::optional<SensorModel> fit_shown_rings(std::vector<double> elevations) {
+  const std::optional<SensorModel> known = built_in(elevations);
+  if (known &&
+      (known->ring_source == RingSource::order || are_near_their_beams(elevations, *known)))
+    return known;
+  SensorModel sensor = of_beams(std::move(elevations));
+  return sensor.faults().empty() ? std::optional(std::move(sensor)) : std::nullopt;
+}
+
 /// Whether a scan with these highest and lowest elevations may be an HDL-64E's, whose beams differ
 /// by half a degree from car to car, and in a compensated scan by more.
 bool is_field_of_hdl_64e(double high, double low) {
@@ -357,7 +382,7 @@ std::optional<SensorModel> fit_sensor(const Scan& scan) {
     if (auto sensor = fit_rings(scan)) return sensor;
   }
   if (std::vector<double> rings = shown_rings(scan); !rings.empty())
-    return fit_beams(std::move(rings));
+    return fit_shown_rings(std::move(rings));
   if (auto sensor = fit_order(scan)) return sensor;
   return fit_bands(scan);
 }

@@ -84,6 +84,26 @@ TEST(FitSensor, GivesALidarWithoutRingsBands) {
   EXPECT_NEAR(fitted->fov_down, -7.0 * degree, 0.2 * degree);
 }
 
+// As CARLA's by default: its highest ring lies between the two highest beams of an HDL-32E.
+TEST(FitSensor, TakesRingsBetweenTheBeamsOfABuiltInSensorForOthers) {
+  SensorModel even;
+  even.rings = 32;
+  even.fov_up = 10.645 * degree;
+  even.fov_down = -30.645 * degree;
+  const auto fitted = fit_sensor(scan_of(even, false));
+  ASSERT_TRUE(fitted);
+  EXPECT_NE(fitted->name, "HDL-32E");
+  ASSERT_EQ(fitted->rings, 32);
+  for (int ring = 0; ring < 32; ++ring)
+    EXPECT_NEAR(fitted->beam_elevation(ring), (10.0 - ring * 40.0 / 31.0) * degree, 0.02 * degree);
+  // A lidar that leans by a quarter of a degree is itself.
+  SensorModel leaning = hdl_32e();
+  leaning.fov_up += 0.25 * degree;
+  leaning.fov_down += 0.25 * degree;
+  for (double& beam : leaning.beam_elevations) beam += 0.25 * degree;
+  EXPECT_EQ(fit_sensor(scan_of(leaning, false))->name, "HDL-32E");
+}
+
 TEST(FitSensor, FindsRingsThatAScanDoesNotNumber) {
   SensorModel uneven;
   uneven.rings = 20;
