@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "core/odometry/pose_search.hpp"
+#include "core/odometry/shift_witnesses.hpp"
 
 namespace stillmap {
 namespace {
@@ -75,6 +76,7 @@ OdometryResult doubted_where_shift_fits(OdometryResult found, const FeatureSets&
   };
   const double fit_beside = 0.5 * (fit_at(-beside_m) + fit_at(beside_m));
   if (fit_at(0.0) - fit_beside >= min_fit_lost) return found;
+  if (witnesses_tell(likely_shift(found, *shift_map), features, map, found, config)) return found;
   found.health = OdometryHealth::degenerate;
   // 1 m, as of all that the scan does not observe.
   found.covariance.topLeftCorner<3, 3>() += *shift_map * shift_map->transpose();

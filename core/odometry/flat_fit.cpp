@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/odometry/scan_features.hpp"
+#include "core/odometry/shift_witnesses.hpp"
 
 namespace stillmap {
 namespace {
@@ -46,7 +47,9 @@ OdometryResult FlatFit::doubted(OdometryResult found, const FeatureSets& feature
   const double lost = fit_at(0.0) - std::max(fit_at(-beside_m), fit_at(beside_m));
   const double counted = std::clamp(lost, -max_counted_lost, max_counted_lost);
   mean_lost_ += mean_gain * (counted - mean_lost_);
-  if (mean_lost_ >= min_mean_lost) return found;
+  if (mean_lost_ >= min_mean_lost ||
+      witnesses_tell(likely_shift(found, beside_map), features, map, found, config))
+    return found;
   if (found.health == OdometryHealth::good) found.health = OdometryHealth::degenerate;
   // 1 m, as of all that the scan does not observe.
   found.covariance.topLeftCorner<3, 3>() += beside_map * beside_map.transpose();

@@ -10,9 +10,9 @@ namespace stillmap {
 /// registration began. One scan alone may be chance.
 class FlatFit {
  public:
-  /// `found`, but degenerate instead of good where this scan and those before lie as well beside.
-  /// It says nothing of a lost one, nor of one by features of single rings. Not of the paper's own
-  /// method.
+  /// `found`, but degenerate instead of good where this scan and those before lie as well beside,
+  /// unless what of this one sees the shift lies clearly worse there (witnesses_tell). It says
+  /// nothing of a lost one, nor of one by features of single rings. Not of the paper's own method.
   [[nodiscard]] OdometryResult doubted(OdometryResult found, const FeatureSets& features,
                                        const LocalMap& map, const OdometryConfig& config);
 

@@ -122,7 +122,8 @@ struct RegistrationConfig {
   /// A direction is degenerate when one metre along it (or a turn that moves points by one metre on
   /// average) changes the mean squared residual by less than this share; it then keeps the
   /// prediction. A shift is degenerate below 0.01, too, and below 0.05 where the scan lies as well
-  /// beside (doubted_where_shift_fits), and followed.
+  /// beside (doubted_where_shift_fits), and followed, unless the few residuals that see it agree
+  /// (witnesses_tell).
   double min_observability = 0.002;
 };
 

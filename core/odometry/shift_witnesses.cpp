@@ -1,0 +1,86 @@
+#include "core/odometry/shift_witnesses.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "core/odometry/correspondence_search.hpp"
+#include "core/odometry/scan_features.hpp"
+#include "core/odometry/se3.hpp"
+
+namespace stillmap {
+namespace {
+
+/// So far to either side [m]: out of the reach of the neighbours of one place.
+constexpr double way_beside_m = 0.6;
+/// Share of their fit that the witnesses must lose there. Of right poses in car parks, on squares
+/// and wide roads it is 0.7 and more, of drives that slide through tunnels at most 0.57, over crops
+/// and meadows 0.17.
+constexpr double min_share_lost = 0.65;
+/// As many witnesses of equal weight as would lose as surely.
+constexpr double min_witnesses = 16.0;
+/// Distance at which the score of a fit is a quarter [m].
+constexpr double score_scale_m = 0.2;
+
+/// How well a feature lies on the map, 0..1, and what it counts as a witness of a shift, 0..1.
+struct Witness {
+  double score = 0.0;
+  double weight = 0.0;
+};
+
+Witness witness_of(const Correspondence& c, const Eigen::Isometry3d& T_map_lidar,
+                   const PoseTangent& shift) {
+  if (!c.found) return {};
+  const Residual r = residual(c.point_lidar, T_map_lidar, c.surface);
+  double squared_m2 = 0.0;
+  double weight = 0.0;
+  for (std::size_t k = 0; k < r.count; ++k) {
+    const double along = r.slopes[k].dot(shift);
+    squared_m2 += c.surface.weights[k] * r.distances[k] * r.distances[k];
+    weight += c.surface.weights[k] * std::min(1.0, along * along);
+  }
+  const double ratio = score_scale_m * score_scale_m / (score_scale_m * score_scale_m + squared_m2);
+  return {.score = ratio * ratio, .weight = weight * c.thinness};
+}
+
+}  // namespace
+
+PoseTangent likely_shift(const OdometryResult& found, const Eigen::Vector3d& shift_map) {
+  const PoseTangent along = found.covariance.leftCols<3>() * shift_map;
+  return along / shift_map.dot(along.head<3>());
+}
+
+bool witnesses_tell(const PoseTangent& shift, const FeatureSets& features, const LocalMap& map,
+                    const OdometryResult& found, const OdometryConfig& config) {
+  const FeatureSets some = downsampled(features);
+  const RegistrationLimits limits = limits_for(some, config.registration);
+  const auto witnesses_at = [&](double way_m) {
+    OdometryResult pose = found;
+    pose.T_map_lidar = boxplus(found.T_map_lidar, way_m * shift);
+    std::vector<Correspondence> correspondences(count_of(some));
+    find_all_correspondences(some, map, pose, limits, correspondences);
+    std::vector<Witness> witnesses;
+    witnesses.reserve(correspondences.size());
+    for (const Correspondence& c : correspondences)
+      witnesses.push_back(witness_of(c, pose.T_map_lidar, shift));
+    return witnesses;
+  };
+  const std::vector<Witness> here = witnesses_at(0.0);
+  return std::ranges::all_of(std::array{-way_beside_m, way_beside_m}, [&](double way_m) {
+    const std::vector<Witness> beside = witnesses_at(way_m);
+    double fit = 0.0;
+    double lost = 0.0;
+    double lost_squares = 0.0;
+    for (std::size_t i = 0; i < here.size(); ++i) {
+      const double lost_here = here[i].weight * (here[i].score - beside[i].score);
+      fit += here[i].weight * here[i].score;
+      lost += lost_here;
+      lost_squares += lost_here * lost_here;
+    }
+    return lost >= min_share_lost * fit && lost * lost >= min_witnesses * lost_squares &&
+           lost > 0.0;
+  });
+}
+
+}  // namespace stillmap
