@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "core/odometry/expected_poses.hpp"
@@ -34,6 +35,14 @@ constexpr double max_disagreement_rad = 0.01;
 /// Points of a ring to either side among which its direction is sought where walls are near: 0.3 m
 /// from one 2 m away, at a fifth of a degree each.
 constexpr std::size_t steps_on_near_walls = 40;
+
+/// How far off the rings of a lidar lie as far apart as the neighbours of a point may [m].
+float surfaces_reach_m(const SensorModel& sensor, const RegistrationConfig& config) {
+  if (sensor.pattern != ScanPattern::rings || sensor.rings < 2)
+    return std::numeric_limits<float>::infinity();
+  const double ring_step_rad = (sensor.fov_up - sensor.fov_down) / (sensor.rings - 1);
+  return static_cast<float>(config.max_neighbour_distance_m / ring_step_rad);
+}
 
 /// The map's z, along the lidar's axes.
 Eigen::Vector3f up_along_lidar(const Eigen::Isometry3d& T_map_lidar) {
@@ -141,6 +150,8 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
 
 void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& prediction) const {
   parts.sparse_rings = is_by_surfaces && (has_sparse_rings(sensor) || is_map_young());
+  if (!parts.scan.ring.empty())
+    parts.surfaces_reach_m = surfaces_reach_m(sensor, config.registration);
   const Eigen::Vector3f up_lidar = up_along_lidar(prediction.T_map_lidar);
   const auto find_features = [&] {
     parts.features = is_by_surfaces ? extract_surfaces(parts.scan, config.features, up_lidar)

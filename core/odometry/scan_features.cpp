@@ -136,6 +136,8 @@ bool is_little_left(const ScanInParts& parts, const OdometryConfig& config) {
     std::size_t left = 0;
     for (const std::uint32_t i : points) {
       if (!not_moving(i) || (!counts_ground && is_ground(parts.labels.classes[i]))) continue;
+      // Houses far behind a car park are many points that nothing can be registered on.
+      if (parts.scan.points_lidar[i].norm() > parts.surfaces_reach_m) continue;
       ++all;
       left += fixed(i) ? 1 : 0;
     }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -41,6 +42,8 @@ struct ScanInParts {
   bool sparse_rings = false;
   /// At first that of the scan before.
   MovableUse movable = MovableUse::none;
+  /// Farther off than this, rings lie farther apart than the neighbours that make a surface [m].
+  float surfaces_reach_m = std::numeric_limits<float>::infinity();
 };
 
 /// The features that are registered: with semantics none on objects that could move, or (without

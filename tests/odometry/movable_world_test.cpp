@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <numbers>
 
 #include "core/odometry/odometry.hpp"
 #include "tests/odometry/box_world.hpp"
@@ -26,15 +27,16 @@ BoxWorld car_park() {
 }
 
 /// The largest error of position of a lidar that sets off along x, by true labels [m].
-double worst_error_m(const BoxWorld& world, Weighting weighting) {
+double worst_error_m(const BoxWorld& world, Weighting weighting,
+                     const SensorModel& sensor = test_lidar()) {
   OdometryConfig config;
   config.weighting = weighting;
-  Odometry odometry(config, test_lidar());
+  Odometry odometry(config, sensor);
   double worst_m = 0.0;
   double x = 0.0;
   for (int k = 0; k < 30; ++k) {
     const Eigen::Isometry3d T_map_lidar(Eigen::Translation3d(x, 0.0, 0.0));
-    const BoxScan seen = world.scan(test_lidar(), T_map_lidar, 0.1 * k);
+    const BoxScan seen = world.scan(sensor, T_map_lidar, 0.1 * k);
     const OdometryResult found = register_scan(odometry, seen.scan, seen.labels()).result;
     worst_m =
         std::max(worst_m, (found.T_map_lidar.translation() - T_map_lidar.translation()).norm());
@@ -50,6 +52,21 @@ TEST(MovableWorld, ACarParkHoldsTheLidarThoughAllOfItCouldMove) {
   const double without_labels_m = worst_error_m(car_park(), Weighting::geometric);
   EXPECT_LT(without_labels_m, 0.05);
   EXPECT_LT(worst_error_m(car_park(), Weighting::semantic), without_labels_m + 0.02);
+}
+
+/// Of houses so far off that no two of its rings make a surface there.
+TEST(MovableWorld, ACarParkHoldsSixteenRingsBeforeHousesFarOff) {
+  SensorModel sensor = test_lidar();
+  sensor.rings = 16;
+  sensor.fov_up = 15.0 * std::numbers::pi / 180.0;
+  sensor.fov_down = -sensor.fov_up;
+  BoxWorld world = car_park();
+  for (const double side : {-1.0, 1.0})
+    for (int k = -2; k <= 4; ++k)
+      world.stand(30.0 * k, side * 60.0, {22.0, 8.0, 14.0}, SemanticClass::building);
+  const double without_labels_m = worst_error_m(world, Weighting::geometric, sensor);
+  EXPECT_LT(without_labels_m, 0.1);
+  EXPECT_LT(worst_error_m(world, Weighting::semantic, sensor), without_labels_m + 0.05);
 }
 
 /// Between rows of lorries that drive as the lidar does, and little else.

@@ -102,6 +102,14 @@ TEST(RegisteredFeatures, DoNotCountTheGroundUnderCarsAsStandingUp) {
   EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 200U);
 }
 
+TEST(RegisteredFeatures, DoNotCountHousesThatAreTooFarOffForSurfaces) {
+  LabelledPoints points(200, 3);
+  for (std::uint32_t i = 0; i < 200; ++i) points.parts.features.upright_points.push_back(i);
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 170U);
+  points.parts.surfaces_reach_m = 32.0F;
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 200U);
+}
+
 TEST(RegisteredFeatures, TakeTheRoadWhereLabelsSayThatItCouldMove) {
   LabelledPoints points(200, 10);
   for (std::uint32_t i = 0; i < 110; ++i) points.parts.features.level_points.push_back(i);
