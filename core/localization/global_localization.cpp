@@ -10,7 +10,7 @@ namespace {
 constexpr std::size_t max_hypotheses = 8;
 
 PoseEvidence mean_of(const std::vector<PoseEvidence>& all) {
-  PoseEvidence sum;
+  PoseEvidence sum{.high_agreed = 0.0};
   for (const PoseEvidence& evidence : all) {
     sum.explained += evidence.explained;
     sum.confirmed += evidence.confirmed;
@@ -18,11 +18,19 @@ PoseEvidence mean_of(const std::vector<PoseEvidence>& all) {
     sum.scan_points += evidence.scan_points;
     sum.map_points += evidence.map_points;
     sum.level_points += evidence.level_points;
+    sum.close += evidence.close;
+    sum.high_agreed += evidence.high_agreed;
   }
   const auto count = static_cast<int>(all.size());
-  if (count == 0) return sum;
-  return {sum.explained / count,   sum.confirmed / count,  sum.level / count,
-          sum.scan_points / count, sum.map_points / count, sum.level_points / count};
+  if (count == 0) return {};
+  return {.explained = sum.explained / count,
+          .confirmed = sum.confirmed / count,
+          .level = sum.level / count,
+          .scan_points = sum.scan_points / count,
+          .map_points = sum.map_points / count,
+          .level_points = sum.level_points / count,
+          .close = sum.close / count,
+          .high_agreed = sum.high_agreed / count};
 }
 
 bool is_within(const Eigen::Isometry3d& off, double distance_m, double angle_rad) {

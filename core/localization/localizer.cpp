@@ -144,16 +144,21 @@ PlaceHypothesis Localizer::align_at(const LocalizationQuery& query,
 bool is_believed(const PoseEvidence& evidence, const LocalizationConfig& config) {
   return evidence.map_points >= config.min_map_points &&
          evidence.explained >= config.min_explained && evidence.confirmed >= config.min_confirmed &&
-         evidence.level >= config.min_level && evidence.score() >= config.min_score;
+         evidence.level >= config.min_level && evidence.score() >= config.min_score &&
+         evidence.high_agreed >= config.min_high_agreed;
 }
 
 LocalizationStatus judge_places(std::span<const PlaceHypothesis> places,
                                 const LocalizationConfig& config, bool is_guessed) {
   if (places.empty() || !is_believed(places.front().evidence, config))
     return LocalizationStatus::not_found;
-  const double score = places.front().evidence.score();
-  if (places.size() > 1 && places[1].evidence.score() > config.max_other_share * score)
-    return LocalizationStatus::ambiguous;
+  const PoseEvidence& best = places.front().evidence;
+  const bool is_close = best.close_score() >= config.min_close_score;
+  for (const PlaceHypothesis& other : places.subspan(1)) {
+    if (other.evidence.score() <= config.max_other_share * best.score()) continue;
+    if (!is_close || other.evidence.close_score() > config.max_other_share * best.close_score())
+      return LocalizationStatus::ambiguous;
+  }
   const bool may_slide = places.front().may_slide && !is_guessed;
   return may_slide ? LocalizationStatus::ambiguous : LocalizationStatus::found;
 }

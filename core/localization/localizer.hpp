@@ -36,12 +36,17 @@ struct LocalizationConfig {
   double min_confirmed = 0.8;
   double min_level = 0.6;
   double min_score = 0.48;
+  /// A place that only looks like it has walls and roofs elsewhere.
+  double min_high_agreed = 0.8;
   /// Poses are registered on the map's surfaces from this score on.
   double min_registered_score = 0.3;
   /// Surfaces that leave less than this share of the score have led astray.
   double min_kept_score = 0.95;
   /// No other place reaches this share of its score.
   double max_other_share = 0.7;
+  /// One that does is told apart where the best place fits so closely, and the other one less than
+  /// that share of it.
+  double min_close_score = 0.55;
   /// Another place is at least so far away, or turned [m, rad].
   double min_other_m = 1.5;
   double min_other_rad = 0.26;

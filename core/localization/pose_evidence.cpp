@@ -18,6 +18,13 @@ constexpr float explained_range_m = 40.0F;
 /// What is higher is hardly traffic [m]; so many points of that tell a place by themselves.
 constexpr float max_traffic_height_m = 2.5F;
 constexpr int min_high_points = 80;
+/// Points lie close to the map as near as this [m]: its own voxels, as far as noise lets them.
+constexpr float close_distance_m = 0.15F;
+/// What of the map is so near [m] was seen together with what would be there.
+constexpr float beside_m = 1.0F;
+/// What is high tells whether it agrees from so many points on, of the scan and of the map.
+constexpr int min_telling_scan_points = 60;
+constexpr int min_telling_map_points = 300;
 /// A level point when the map's height differs by less [m].
 constexpr float max_level_distance_m = 0.25F;
 constexpr float ground_search_m = 0.6F;
@@ -95,22 +102,30 @@ void MapSurroundings::ask_map(const LocalizationQuery& query, const Eigen::Isome
                               PoseEvidence& evidence) const {
   const Eigen::Isometry3f T_foot_upright = query.T_foot_upright.cast<float>();
   int explained = 0;
+  int close = 0;
   int high_points = 0;
   int high_explained = 0;
+  int high_beside = 0;
   for (const FeaturePoint& point : query.features_upright.points) {
     if (point.position_lidar.norm() > explained_range_m) continue;
-    const bool is_explained =
-        map_.planes.nearest(T * point.position_lidar, 1, max_distance_m).count > 0;
-    const bool is_high =
-        query.has_ground && (T_foot_upright * point.position_lidar).z() > max_traffic_height_m;
+    const Eigen::Vector3f p = T * point.position_lidar;
+    const Neighbours near = map_.planes.nearest(p, 1, max_distance_m);
+    const bool is_explained = near.count > 0;
     ++evidence.scan_points;
     explained += is_explained ? 1 : 0;
-    high_points += is_high ? 1 : 0;
-    high_explained += is_high && is_explained ? 1 : 0;
+    close += is_explained && near.squared_distance[0] < close_distance_m * close_distance_m ? 1 : 0;
+    if (!query.has_ground || (T_foot_upright * point.position_lidar).z() <= max_traffic_height_m)
+      continue;
+    ++high_points;
+    high_explained += is_explained ? 1 : 0;
+    high_beside += is_explained || map_.planes.nearest(p, 1, beside_m).count > 0 ? 1 : 0;
   }
   evidence.explained = share(explained, evidence.scan_points);
+  evidence.close = share(close, evidence.scan_points);
   if (high_points >= min_high_points)
     evidence.explained = std::max(evidence.explained, share(high_explained, high_points));
+  if (high_beside >= min_telling_scan_points)
+    evidence.high_agreed *= share(high_explained, high_beside);
 }
 
 std::pair<int, int> MapSurroundings::explained_by_one(
@@ -148,6 +163,8 @@ void MapSurroundings::ask_scan(const LocalizationQuery& query, const Eigen::Isom
   const Eigen::Isometry3f T_upright_map = T.inverse();
   const Eigen::Isometry3f T_foot_map = query.T_foot_upright.cast<float>() * T_upright_map;
   int confirmed = 0;
+  int high_points = 0;
+  int high_confirmed = 0;
   for (const LabelledPoint& point : points_map_) {
     const Eigen::Vector3f p = T_upright_map * point.position_map;
     if (p.squaredNorm() > visible_range_m * visible_range_m) continue;
@@ -155,10 +172,16 @@ void MapSurroundings::ask_scan(const LocalizationQuery& query, const Eigen::Isom
     if (!is_expected(point, query.has_ground ? height_m : any_height_m)) continue;
     const DirectionRanges::Sight sight = query.ranges_upright.look_at(p);
     if (sight == DirectionRanges::Sight::unknown) continue;
+    const int is_hit = sight == DirectionRanges::Sight::hit ? 1 : 0;
     ++evidence.map_points;
-    if (sight == DirectionRanges::Sight::hit) ++confirmed;
+    confirmed += is_hit;
+    if (!query.has_ground || height_m <= max_traffic_height_m) continue;
+    ++high_points;
+    high_confirmed += is_hit;
   }
   evidence.confirmed = share(confirmed, evidence.map_points);
+  if (high_points >= min_telling_map_points)
+    evidence.high_agreed *= share(high_confirmed, high_points);
 }
 
 }  // namespace stillmap

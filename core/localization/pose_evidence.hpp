@@ -24,9 +24,19 @@ struct PoseEvidence {
   int scan_points = 0;
   int map_points = 0;
   int level_points = 0;
+  /// Share of what stands up in the scan that lies close to points of the map. Places that look
+  /// alike fit roughly, the right one closely.
+  double close = 0.0;
+  /// What is too high to be traffic: of the map's, the share that the scan shows; times, of the
+  /// scan's that has any of the map beside it, the share that lies on it. 1 where little is so
+  /// high. Parked vehicles that came or left change neither, nor does the end of the map.
+  double high_agreed = 1.0;
 
   /// 0..1; low where any of them is.
   [[nodiscard]] double score() const { return explained * confirmed; }
+  /// The same, of what is close. It tells more apart, but is low wherever the map is blurred or
+  /// thin.
+  [[nodiscard]] double close_score() const { return close * confirmed; }
 };
 
 /// Where a scan lies on the map's surfaces.
