@@ -224,10 +224,11 @@ bool LiveTile::clear_seen_through(const VisibilityTest& test, std::uint32_t scan
     const Eigen::Vector3f position_map = mean_map(voxel);
     const Thin thin_by = thin(voxel);
     std::uint32_t misses = is_new ? test.times_free_before(position_map, thin_by) : 0;
-    if (voxel.last_scan != scan && test.is_free(position_map, thin_by)) ++misses;
-    if (misses == 0) return;
     const bool was_hidden = is_seen_through(voxel, rule);
     const bool was_rest = voxel.misses == misses_of_rest;
+    const bool needs_more = !was_hidden || was_rest || !test.only_hides;
+    if (needs_more && voxel.last_scan != scan && test.is_free(position_map, thin_by)) ++misses;
+    if (misses == 0) return;
     add_misses(voxel, misses);
     // Where it takes more misses than these.
     if (was_rest && !is_seen_through(voxel, rule)) voxel.misses = misses_of_rest;

@@ -61,6 +61,9 @@ struct VisibilityTest {
   std::function<std::uint32_t(const Eigen::Vector3f& position_map, Thin thin)> times_free_before;
   /// Voxels that no scan hit until this one are asked how often they were free before.
   std::uint32_t last_scan_cleared = 0;
+  /// Of what is hidden already this scan counts no miss: looks that follow each other at once tell
+  /// little more than one of them, and would keep hidden what is hit again.
+  bool only_hides = false;
   /// Those of the tile's scans; null: what is hidden says nothing of what is beside it.
   const ScanStamps* stamps = nullptr;
 };

@@ -50,6 +50,9 @@ const StaticMapConfig& checked(const StaticMapConfig& config) {
 /// place in sight for less.
 constexpr std::int64_t settled_ns = 60'000'000'000;
 
+/// Of a map that begins each of so many scans clears.
+constexpr std::uint64_t first_scans = 16;
+
 bool is_same_size(double a_m, double b_m) { return std::abs(a_m - b_m) <= 1e-9; }
 
 }  // namespace
@@ -114,6 +117,11 @@ struct StaticMap::State {
                                   Thin thin) const;
   /// How many of the views that are kept saw through this position.
   [[nodiscard]] std::uint32_t times_free(const Eigen::Vector3f& position_map, Thin thin) const;
+  /// Whether the map begins: there is hardly a view yet that tells what was free before.
+  [[nodiscard]] bool begins() const {
+    return !max_earlier_scans && config.clearing_interval > 1 &&
+           inserted <= std::min<std::uint64_t>(config.free_space_history, first_scans);
+  }
   /// Keeps the view of a scan that cleared.
   void keep(RangeImageView view, std::uint32_t scan);
   void forget_views();
@@ -242,7 +250,8 @@ bool StaticMap::is_clearing() const {
 }
 
 bool StaticMap::clearing_due() const {
-  return is_clearing() && state_->inserted % state_->config.clearing_interval == 0;
+  return is_clearing() &&
+         (state_->begins() || state_->inserted % state_->config.clearing_interval == 0);
 }
 
 void StaticMap::clear_seen_through(RangeImageView view, std::int64_t stamp_ns) {
@@ -257,6 +266,7 @@ void StaticMap::clear_seen_through(RangeImageView view, std::int64_t stamp_ns) {
       .times_free_before = [&](const Eigen::Vector3f& p_map,
                                Thin thin) { return state_->times_free(p_map, thin); },
       .last_scan_cleared = state_->last_scan_cleared,
+      .only_hides = state_->begins(),
       .stamps = &tiles.stamps()};
   std::vector<std::uint8_t> hides(near.size());
   state_->enter_session(near);

@@ -25,7 +25,8 @@ struct StaticMapConfig {
   double max_range_m = 60.0;
   /// A voxel enters the view once it was hit this often.
   std::uint32_t min_points = 1;
-  /// Visibility clearing runs on every n-th scan: consecutive scans see through the same voxels.
+  /// Visibility clearing runs on every n-th scan: consecutive scans see through the same voxels. Of
+  /// a new map it runs on each of the first 16, and of as many as `free_space_history` at most.
   std::uint32_t clearing_interval = 3;
   /// A voxel is hidden once this many of those scans saw through it, and this many for each scan
   /// that hit it.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <vector>
 
 #include "core/lidar/range_image_view.hpp"
 #include "core/map/static_map.hpp"
@@ -87,6 +88,20 @@ class VisibilityClearing : public testing::Test {
                               stamp_ns_);
     }
   }
+  /// As the mapper does: only where it is due. Returns in which of the scans.
+  template <typename World>
+  std::vector<int> see_when_due(World world, int scans) {
+    std::vector<int> due;
+    for (int i = 1; i <= scans; ++i) {
+      const LabelledScan scan = looking_ahead(++stamp_ns_, world);
+      map_.insert(scan, Isometry3d::Identity());
+      if (!map_.clearing_due()) continue;
+      due.push_back(i);
+      map_.clear_seen_through(RangeImageView(scan.scan, {}, hdl_64e(), Isometry3d::Identity()),
+                              stamp_ns_);
+    }
+    return due;
+  }
   [[nodiscard]] int shown(SemanticClass label) {
     int count = 0;
     for (const auto& tile : map_.view()->tiles) {
@@ -147,6 +162,32 @@ TEST_F(VisibilityClearing, WhatComesIntoFreeSpaceAndStaysIsShownInTheEnd) {
   see(wall, 10);
   see(unknown_ghost, 100);
   EXPECT_GT(shown(unlabeled), 50);
+}
+
+TEST_F(VisibilityClearing, IsDueWithEachOfTheFirstScansOfANewMap) {
+  const std::vector<int> first = see_when_due(wall, 24);
+  const std::vector<int> expected{1,  2,  3,  4,  5,  6,  7,  8,  9, 10,
+                                  11, 12, 13, 14, 15, 16, 18, 21, 24};
+  EXPECT_EQ(first, expected);
+  map_.reset(2);
+  EXPECT_EQ(see_when_due(wall, 24), expected);
+  map_.reset(3);
+  map_.begin_session();
+  EXPECT_EQ(see_when_due(wall, 8), (std::vector{3, 6})) << "what was there is known";
+  StaticMapConfig config;
+  config.free_space_history = 0;
+  map_ = StaticMap(config);
+  EXPECT_EQ(see_when_due(wall, 8), (std::vector{3, 6}));
+  config.free_space_history = 2;
+  map_ = StaticMap(config);
+  EXPECT_EQ(see_when_due(wall, 8), (std::vector{1, 2, 3, 6}));
+}
+
+TEST_F(VisibilityClearing, WhatComesIntoFreeSpaceIsNotShownFromTheSecondScanOn) {
+  see_when_due(wall, 1);
+  see_when_due(unknown_ghost, 1);
+  EXPECT_LT(shown(unlabeled), 5);
+  EXPECT_GT(removed(RemovalReason::seen_through), 50);
 }
 
 TEST_F(VisibilityClearing, WithoutAHistoryOnlyLaterScansClear) {
