@@ -125,7 +125,8 @@ GlobalLocalization::Outcome GlobalLocalization::look_for(const Localizer& locali
   }
   move_window();
   add_evidence(localizer, query, std::move(result.places));
-  const std::vector<PlaceHypothesis> places = mean_places();
+  std::vector<PlaceHypothesis> places = mean_places();
+  put_believed_first(places, localizer.config());
   const bool is_of_several = window_.size() > 1;
   const LocalizationStatus status =
       is_of_several ? judge_places(places, localizer.config(), regions.searched.has_value())

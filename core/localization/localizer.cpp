@@ -67,6 +67,7 @@ LocalizationResult Localizer::judged(const LocalizationQuery& query,
         }))
       apart.push_back(place);
   }
+  put_believed_first(apart, config_);
   add_other_storeys(query, apart);
   drop_denied_storeys(query, apart);
   const LocalizationStatus status = judge_places(apart, config_);
@@ -95,6 +96,7 @@ void Localizer::add_other_storeys(const LocalizationQuery& query,
   std::ranges::stable_sort(places, [](const PlaceHypothesis& a, const PlaceHypothesis& b) {
     return a.evidence.score() > b.evidence.score();
   });
+  put_believed_first(places, config_);
 }
 
 void Localizer::drop_denied_storeys(const LocalizationQuery& query,
@@ -141,11 +143,27 @@ PlaceHypothesis Localizer::align_at(const LocalizationQuery& query,
   return is_worse ? by_points : place;
 }
 
-bool is_believed(const PoseEvidence& evidence, const LocalizationConfig& config) {
+namespace {
+
+bool is_believed_without_heights(const PoseEvidence& evidence, const LocalizationConfig& config) {
   return evidence.map_points >= config.min_map_points &&
          evidence.explained >= config.min_explained && evidence.confirmed >= config.min_confirmed &&
-         evidence.level >= config.min_level && evidence.score() >= config.min_score &&
+         evidence.level >= config.min_level && evidence.score() >= config.min_score;
+}
+
+}  // namespace
+
+bool is_believed(const PoseEvidence& evidence, const LocalizationConfig& config) {
+  return is_believed_without_heights(evidence, config) &&
          evidence.high_agreed >= config.min_high_agreed;
+}
+
+void put_believed_first(std::vector<PlaceHypothesis>& places, const LocalizationConfig& config) {
+  const auto believed = std::ranges::find_if(
+      places, [&](const PlaceHypothesis& place) { return is_believed(place.evidence, config); });
+  if (believed == places.end() || believed == places.begin()) return;
+  if (is_believed_without_heights(places.front().evidence, config))
+    std::rotate(places.begin(), believed, believed + 1);
 }
 
 LocalizationStatus judge_places(std::span<const PlaceHypothesis> places,
@@ -154,9 +172,13 @@ LocalizationStatus judge_places(std::span<const PlaceHypothesis> places,
     return LocalizationStatus::not_found;
   const PoseEvidence& best = places.front().evidence;
   const bool is_close = best.close_score() >= config.min_close_score;
+  // What lies close there tells nothing of a place that the map knows thinly.
+  constexpr double min_known_share = 0.7;
   for (const PlaceHypothesis& other : places.subspan(1)) {
     if (other.evidence.score() <= config.max_other_share * best.score()) continue;
-    if (!is_close || other.evidence.close_score() > config.max_other_share * best.close_score())
+    const bool is_thin = other.evidence.map_points < min_known_share * best.map_points;
+    if (!is_close || is_thin ||
+        other.evidence.close_score() > config.max_other_share * best.close_score())
       return LocalizationStatus::ambiguous;
   }
   const bool may_slide = places.front().may_slide && !is_guessed;

@@ -80,6 +80,9 @@ struct PlaceHypothesis {
                                               bool is_guessed = false);
 /// Whether a pose can be believed by its evidence alone, whatever other places there are.
 [[nodiscard]] bool is_believed(const PoseEvidence& evidence, const LocalizationConfig& config);
+/// Of places sorted by score: where only what is high denies the first one, the best one that is
+/// believed comes before it. The first one stays its rival.
+void put_believed_first(std::vector<PlaceHypothesis>& places, const LocalizationConfig& config);
 
 struct LocalizationResult {
   LocalizationStatus status = LocalizationStatus::no_evidence;

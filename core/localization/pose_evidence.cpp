@@ -118,7 +118,7 @@ void MapSurroundings::ask_map(const LocalizationQuery& query, const Eigen::Isome
       continue;
     ++high_points;
     high_explained += is_explained ? 1 : 0;
-    high_beside += is_explained || map_.planes.nearest(p, 1, beside_m).count > 0 ? 1 : 0;
+    high_beside += is_explained || is_beside(p) ? 1 : 0;
   }
   evidence.explained = share(explained, evidence.scan_points);
   evidence.close = share(close, evidence.scan_points);
@@ -126,6 +126,12 @@ void MapSurroundings::ask_map(const LocalizationQuery& query, const Eigen::Isome
     evidence.explained = std::max(evidence.explained, share(high_explained, high_points));
   if (high_beside >= min_telling_scan_points)
     evidence.high_agreed *= share(high_explained, high_beside);
+}
+
+bool MapSurroundings::is_beside(const Eigen::Vector3f& point_map) const {
+  const Neighbours near = map_.planes.nearest(point_map, 1, beside_m);
+  return near.count > 0 &&
+         (near.points[0].position_map - point_map).head<2>().norm() > max_distance_m;
 }
 
 std::pair<int, int> MapSurroundings::explained_by_one(

@@ -29,7 +29,8 @@ struct PoseEvidence {
   double close = 0.0;
   /// What is too high to be traffic: of the map's, the share that the scan shows; times, of the
   /// scan's that has any of the map beside it, the share that lies on it. 1 where little is so
-  /// high. Parked vehicles that came or left change neither, nor does the end of the map.
+  /// high. Parked vehicles that came change neither, nor does the end of the map; of lorries that left, what
+  /// was high counts as seen through.
   double high_agreed = 1.0;
 
   /// 0..1; low where any of them is.
@@ -73,6 +74,9 @@ class MapSurroundings {
                PoseEvidence& evidence) const;
   void ask_ground(const LocalizationQuery& query, const Eigen::Isometry3f& T,
                   PoseEvidence& evidence) const;
+  /// Whether a point that the map does not explain lies level beside something of it: above its
+  /// upper end, or between two of its rings, it says nothing.
+  [[nodiscard]] bool is_beside(const Eigen::Vector3f& point_map) const;
   void ask_scan(const LocalizationQuery& query, const Eigen::Isometry3f& T,
                 PoseEvidence& evidence) const;
 

@@ -119,7 +119,7 @@ struct StaticMap::State {
   [[nodiscard]] std::uint32_t times_free(const Eigen::Vector3f& position_map, Thin thin) const;
   /// Whether the map begins: there is hardly a view yet that tells what was free before.
   [[nodiscard]] bool begins() const {
-    return !max_earlier_scans && config.clearing_interval > 1 &&
+    return !max_earlier_scans && !is_resumed && config.clearing_interval > 1 &&
            inserted <= std::min<std::uint64_t>(config.free_space_history, first_scans);
   }
   /// Keeps the view of a scan that cleared.
@@ -150,6 +150,8 @@ struct StaticMap::State {
   std::set<TileId> in_session;
   /// Scans so far.
   std::uint64_t inserted = 0;
+  /// The map had voxels before its first scan.
+  bool is_resumed = false;
   /// Views of the last scans that cleared, newest last, and the number of the newest one.
   std::deque<RangeImageView> past_views;
   std::uint32_t last_scan_cleared = 0;
@@ -364,6 +366,7 @@ void StaticMap::reset(std::uint64_t map_id) {
   state_->tiles.clear(map_id);
   state_->in_checkpoint.clear();
   state_->inserted = 0;
+  state_->is_resumed = false;
   state_->max_earlier_scans.reset();
   state_->session_begin_ns.reset();
   state_->in_session.clear();
@@ -479,6 +482,7 @@ std::string StaticMap::RestoredVoxels::unreadable_text() const {
 void StaticMap::resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidence) {
   check_sizes(view, state_->config);
   reset(view.map_id);
+  state_->is_resumed = true;
   state_->tiles.resume(view, tile_evidence);
 }
 

@@ -177,6 +177,13 @@ Eigen::Vector3f across(const Eigen::Vector3f& vector, const Eigen::Vector3f& alo
   return length2 > 0.0F ? Eigen::Vector3f(vector - along * (along.dot(vector) / length2)) : vector;
 }
 
+/// Whether a ring goes straight on through a point, by the sums of the ways to its neighbours on
+/// both sides: at the near rim of something it does not, however far off the background is.
+bool is_straight(const Eigen::Vector3f& before, const Eigen::Vector3f& after) {
+  constexpr float min_cosine = 0.8F;
+  return -before.dot(after) > min_cosine * before.norm() * after.norm();
+}
+
 /// ring_curvature() of a ring whose spacing is known.
 std::vector<float> curvature_of(std::span<const Eigen::Vector3f> ring, const RingSpacing& spacing) {
   const std::size_t half_window = spacing.half_window;
@@ -193,7 +200,7 @@ std::vector<float> curvature_of(std::span<const Eigen::Vector3f> ring, const Rin
     }
     Eigen::Vector3f sum = before + after;
     // What is left of it along a straight line is that one side's neighbours are farther away.
-    if (spacing.is_uneven) sum = across(sum, after - before);
+    if (spacing.is_uneven && is_straight(before, after)) sum = across(sum, after - before);
     curvature[i] = sum.squaredNorm();
   }
   return curvature;

@@ -36,11 +36,16 @@ constexpr double max_disagreement_rad = 0.01;
 /// from one 2 m away, at a fifth of a degree each.
 constexpr std::size_t steps_on_near_walls = 40;
 
-/// How far off the rings of a lidar lie as far apart as the neighbours of a point may [m].
+/// How far off the rings of a lidar, where they are closest, lie as far apart as the neighbours of
+/// a point may [m].
 float surfaces_reach_m(const SensorModel& sensor, const RegistrationConfig& config) {
   if (sensor.pattern != ScanPattern::rings || sensor.rings < 2)
     return std::numeric_limits<float>::infinity();
-  const double ring_step_rad = (sensor.fov_up - sensor.fov_down) / (sensor.rings - 1);
+  double ring_step_rad = std::numeric_limits<double>::infinity();
+  for (int ring = 1; ring < sensor.rings; ++ring) {
+    const double step_rad = std::abs(sensor.beam_elevation(ring - 1) - sensor.beam_elevation(ring));
+    if (step_rad > 0.0) ring_step_rad = std::min(ring_step_rad, step_rad);
+  }
   return static_cast<float>(config.max_neighbour_distance_m / ring_step_rad);
 }
 

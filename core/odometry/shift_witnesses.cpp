@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
+#include <span>
 #include <vector>
 
 #include "core/odometry/correspondence_search.hpp"
@@ -20,6 +22,10 @@ constexpr double way_beside_m = 0.6;
 constexpr double min_share_lost = 0.65;
 /// As many witnesses of equal weight as would lose as surely.
 constexpr double min_witnesses = 16.0;
+/// And as many places of this size [m] as would lose as surely: the back of a lorry has thirty
+/// witnesses, and moves.
+constexpr double min_places = 5.0;
+constexpr double place_m = 4.0;
 /// Distance at which the score of a fit is a quarter [m].
 constexpr double score_scale_m = 0.2;
 
@@ -27,7 +33,14 @@ constexpr double score_scale_m = 0.2;
 struct Witness {
   double score = 0.0;
   double weight = 0.0;
+  /// In the lidar frame, in steps of place_m.
+  std::array<int, 2> place{};
 };
+
+std::array<int, 2> place_of(const Eigen::Vector3d& point_lidar) {
+  return {static_cast<int>(std::floor(point_lidar.x() / place_m)),
+          static_cast<int>(std::floor(point_lidar.y() / place_m))};
+}
 
 Witness witness_of(const Correspondence& c, const Eigen::Isometry3d& T_map_lidar,
                    const PoseTangent& shift) {
@@ -41,7 +54,33 @@ Witness witness_of(const Correspondence& c, const Eigen::Isometry3d& T_map_lidar
     weight += c.surface.weights[k] * std::min(1.0, along * along);
   }
   const double ratio = score_scale_m * score_scale_m / (score_scale_m * score_scale_m + squared_m2);
-  return {.score = ratio * ratio, .weight = weight * c.thinness};
+  return {.score = ratio * ratio, .weight = weight * c.thinness, .place = place_of(c.point_lidar)};
+}
+
+/// So many equal parts have the same sum and the same sum of squares.
+double effective_count(double sum, double squares) {
+  return squares > 0.0 ? sum * sum / squares : 0.0;
+}
+
+/// Whether the witnesses lose enough of their fit at another place, and enough of them.
+bool lose(std::span<const Witness> here, std::span<const Witness> beside) {
+  double fit = 0.0;
+  double lost = 0.0;
+  double lost_squares = 0.0;
+  std::map<std::array<int, 2>, double> lost_by_place;
+  for (std::size_t i = 0; i < here.size(); ++i) {
+    if (!(here[i].weight > 0.0)) continue;
+    const double lost_here = here[i].weight * (here[i].score - beside[i].score);
+    fit += here[i].weight * here[i].score;
+    lost += lost_here;
+    lost_squares += lost_here * lost_here;
+    lost_by_place[here[i].place] += lost_here;
+  }
+  double place_squares = 0.0;
+  for (const auto& [place, lost_there] : lost_by_place) place_squares += lost_there * lost_there;
+  return lost > 0.0 && lost >= min_share_lost * fit &&
+         effective_count(lost, lost_squares) >= min_witnesses &&
+         effective_count(lost, place_squares) >= min_places;
 }
 
 }  // namespace
@@ -67,20 +106,8 @@ bool witnesses_tell(const PoseTangent& shift, const FeatureSets& features, const
     return witnesses;
   };
   const std::vector<Witness> here = witnesses_at(0.0);
-  return std::ranges::all_of(std::array{-way_beside_m, way_beside_m}, [&](double way_m) {
-    const std::vector<Witness> beside = witnesses_at(way_m);
-    double fit = 0.0;
-    double lost = 0.0;
-    double lost_squares = 0.0;
-    for (std::size_t i = 0; i < here.size(); ++i) {
-      const double lost_here = here[i].weight * (here[i].score - beside[i].score);
-      fit += here[i].weight * here[i].score;
-      lost += lost_here;
-      lost_squares += lost_here * lost_here;
-    }
-    return lost >= min_share_lost * fit && lost * lost >= min_witnesses * lost_squares &&
-           lost > 0.0;
-  });
+  return std::ranges::all_of(std::array{-way_beside_m, way_beside_m},
+                             [&](double way_m) { return lose(here, witnesses_at(way_m)); });
 }
 
 }  // namespace stillmap

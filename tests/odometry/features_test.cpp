@@ -162,6 +162,21 @@ TEST(ExtractFeatures, AFlatWallHasNoEdgesWhereHalfOfTheRaysAreDropped) {
   }
 }
 
+TEST(ExtractFeatures, ANearRimIsAnEdgeWhereHalfOfTheRaysAreDropped) {
+  for (const double step_degrees : {0.2, 0.4}) {
+    // The front of a box before a wall that is far off.
+    const auto box = [](double azimuth) {
+      return (std::abs(azimuth) < 15.0 * degree ? 4.0 : 30.0) / std::cos(azimuth);
+    };
+    const Scan scan =
+        half_of(ring_scan(-60.0 * degree, 60.0 * degree, box, 0, 0.0F, step_degrees * degree));
+    const Features features = extract_features(scan, FeatureConfig{});
+    const auto rims = std::ranges::count_if(
+        features.edges, [&](std::uint32_t i) { return scan.points_lidar[i].x() < 5.0F; });
+    EXPECT_GE(rims, 2) << step_degrees;
+  }
+}
+
 TEST(ExtractFeatures, ACornerIsAnEdgeWhereHalfOfTheRaysAreDropped) {
   // The corner lies at the azimuth of 0.
   const auto corner = [](double azimuth) {

@@ -14,10 +14,10 @@
 namespace stillmap {
 namespace {
 
-enum class Place { car_park, passage, meadow };
+enum class Place { car_park, between_lorries, passage, meadow };
 
-/// A thousand points round the lidar: of ground with four cars on it, of a smooth passage, or
-/// anywhere in grass.
+/// A thousand points round the lidar: of ground with cars on it or with lorries ahead and behind, of
+/// a smooth passage, or anywhere in grass.
 FeatureSets seen_in(Place place, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> unit(-1.0F, 1.0F);
@@ -36,7 +36,11 @@ FeatureSets seen_in(Place place, unsigned seed) {
     } else if (k % 6 != 0) {
       add(12.0F * unit(random), 12.0F * unit(random), -1.7F);
     } else if (k % 12 == 0) {
-      add(k % 24 == 0 ? 6.0F : -6.0F, 5.0F + unit(random), -1.0F + 0.6F * unit(random));
+      // Fronts and backs: of cars to both sides, or of the lorries ahead and behind alone.
+      const bool is_car = place == Place::car_park;
+      const float x = is_car && k % 48 >= 24 ? 10.0F : 6.0F;
+      const float y = is_car ? (k % 96 < 48 ? 5.0F : -5.0F) : 0.0F;
+      add(k % 24 == 0 ? x : -x, y + unit(random), -1.0F + 0.6F * unit(random));
     } else {
       add(5.0F + unit(random), k % 18 == 0 ? 7.0F : -7.0F, -1.0F + 0.6F * unit(random));
     }
@@ -64,8 +68,12 @@ bool tells_of_shift_along_x(Place place) {
   return witnesses_tell(shift, features, map, found, config);
 }
 
-TEST(ShiftWitnesses, AFewCarsOnOpenGroundTellOfAShift) {
+TEST(ShiftWitnesses, CarsOnOpenGroundTellOfAShift) {
   EXPECT_TRUE(tells_of_shift_along_x(Place::car_park));
+}
+
+TEST(ShiftWitnesses, TheLorriesAheadAndBehindAloneDoNot) {
+  EXPECT_FALSE(tells_of_shift_along_x(Place::between_lorries));
 }
 
 TEST(ShiftWitnesses, TheNoiseOfASmoothPassageDoesNot) {
