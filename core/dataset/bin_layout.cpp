@@ -32,6 +32,9 @@ constexpr double clearly_better = 0.6;
 constexpr double much_noise = 0.05;
 constexpr double no_noise = 0.01;
 constexpr double mostly_noise = 0.5;
+/// So many numbers next to zero have whole numbers that are read as floating point, and no
+/// coordinates in any unit, or of any frame.
+constexpr double many_next_to_zero = 0.2;
 
 /// The beginning of a file.
 struct Beginning {
@@ -80,11 +83,16 @@ bool fits_sizes(const std::vector<Beginning>& files, std::size_t point_bytes) {
   return 2 * static_cast<std::size_t>(fitting) > files.size();
 }
 
+bool is_next_to_zero(double value) {
+  const double size = std::abs(value);
+  return size > 0.0 && size < 1e-6;
+}
+
 /// Neither zero nor of the size of a coordinate in metres, as other numbers are when they are read
 /// as floating point.
 bool is_noise(double value) {
   const double size = std::abs(value);
-  return std::isfinite(value) && size > 0.0 && (size < 1e-6 || size > 1e5);
+  return std::isfinite(value) && (is_next_to_zero(value) || size > 1e5);
 }
 
 /// Share of noise among `values` numbers at the beginning of every `point_bytes`.
@@ -101,6 +109,18 @@ double noise(const std::vector<Beginning>& files, std::size_t point_bytes, std::
     }
   }
   return seen == 0 ? 1.0 : static_cast<double>(bad) / static_cast<double>(seen);
+}
+
+/// Share of float32 values that are all but zero.
+double share_next_to_zero(const std::vector<Beginning>& files) {
+  std::size_t seen = 0, found = 0;
+  for (const Beginning& file : files) {
+    for (std::size_t at = 0; at + sizeof(float) <= file.bytes.size(); at += sizeof(float)) {
+      found += is_next_to_zero(double{file.value<float>(at)}) ? 1U : 0U;
+      ++seen;
+    }
+  }
+  return seen == 0 ? 0.0 : static_cast<double>(found) / static_cast<double>(seen);
 }
 
 /// How far float32 values are apart that lie so many values apart.
@@ -236,7 +256,7 @@ bool have_negatives_everywhere(const std::vector<Beginning>& files) {
     }
   }
   for (std::size_t k = 0; k < kitti_values; ++k)
-    if (one_in * negative[k] < seen[k]) return false;
+    if (seen[k] == 0 || one_in * negative[k] < seen[k]) return false;
   return fits_sizes(files, kitti_bytes);
 }
 
@@ -284,7 +304,9 @@ std::optional<OtherLayout> other_numbers(const std::vector<Beginning>& files) {
         count + " bytes a point, of which the first are x y z as float32",
         "np.fromfile('IN.bin', 'u1').reshape(-1, " + count + ")[:, :16].copy().view('f4')"};
   }
-  if (noise_share < mostly_noise || !are_many_values(files)) return std::nullopt;
+  if (noise_share < mostly_noise || share_next_to_zero(files) < many_next_to_zero ||
+      !are_many_values(files))
+    return std::nullopt;
   return OtherLayout{"numbers that are no float32, such as NCLT's, which have 16 bits", {}};
 }
 

@@ -113,7 +113,8 @@ std::string remark_on_axes(const CloudContent& cloud, const PointFieldNames& nam
   std::string fields;
   for (const CloudField& field : cloud.fields) fields.append(" ").append(field.name, 0, 40);
   if (fields != " x y z I" && fields != " x y z CosAngle ObjIdx ObjTag") return {};
-  return "; these fields are CARLA's, whose y points to the right: the map is mirrored, unless "
+  return "; these fields are as CARLA's, whose y points to the right: then the map is mirrored, "
+         "unless "
          "'input: {fields: {y: [-y]}}' in a --config file says so";
 }
 

@@ -187,6 +187,29 @@ TEST_F(BinLayoutTest, TakesEveryFileOfKittisLayout) {
   EXPECT_TRUE(is_kittis(whole));
 }
 
+// It is said elsewhere that half of the points are no lidar's.
+TEST_F(BinLayoutTest, TakesCoordinatesOfOtherFramesAndUnits) {
+  const auto is_taken = [&](auto other) {
+    std::vector<Measured> points = turn();
+    for (Measured& p : points) other(p);
+    return is_kittis(values_of(points, 4)) && is_kittis(values_of(points, 4, 0.0F));
+  };
+  EXPECT_TRUE(is_taken([](Measured& p) { p.x += 458'000.0F, p.y += 5'428'000.0F; })) << "UTM";
+  EXPECT_TRUE(is_taken([](Measured& p) {
+    p.x += 4'157'000.0F, p.y += 664'000.0F, p.z += 4'774'000.0F;
+  })) << "ECEF";
+  EXPECT_TRUE(is_taken([](Measured& p) { p.x *= 1e6F, p.y *= 1e6F, p.z *= 1e6F; })) << "um";
+}
+
+TEST_F(BinLayoutTest, TakesFilesOfWhichMostPointsAreMissing) {
+  for (const float missing : {1e9F, std::numeric_limits<float>::max()}) {
+    std::vector<Measured> points = turn();
+    for (std::size_t i = 0; i < points.size(); ++i)
+      if (i % 10 != 0) points[i] = {missing, missing, missing, 0.0F, 0.0F};
+    EXPECT_TRUE(is_kittis(values_of(points, 4))) << missing;
+  }
+}
+
 /// A corridor of 20 m along y by 1 m, its points in no order.
 std::vector<Measured> corridor(float brightest) {
   std::mt19937 random(3);
