@@ -205,9 +205,15 @@ void bind_dataset(py::module_& module) {
           "What of a bag cannot be read at all, in words.")
       .def_property_readonly(
           "remarks",
-          [](const SharedRecording& shared) { return shared.recording.dataset.remarks(); },
+          [](SharedRecording& shared) {
+            const py::gil_scoped_release released;
+            const std::scoped_lock lock(shared.reading);
+            return shared.recording.dataset.remarks();
+          },
           "What was understood or taken for granted, in words: from which fields intensity, times "
-          "and rings are; that files whose names tell no time follow each other by 0.1 s.");
+          "and rings are; that files whose names tell no time follow each other by 0.1 s; that "
+          "coordinates can be no metres; that scans are parts of a turn, or that another axis than "
+          "z is up. Reads some scans.");
   bind_open_dataset(module);
 }
 

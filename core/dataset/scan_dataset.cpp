@@ -355,7 +355,7 @@ std::string ScanDataset::remark_on_times() const {
              "them do not fit to that");
 }
 
-std::vector<std::string> ScanDataset::remarks() const {
+std::vector<std::string> ScanDataset::remarks(bool is_mount_known) const {
   std::vector<std::string> remarks;
   if (!format_.empty()) remarks.push_back("points have " + format_);
   if (const std::string remark = remark_on_times(); !remark.empty()) remarks.push_back(remark);
@@ -364,7 +364,8 @@ std::vector<std::string> ScanDataset::remarks() const {
         "half of the points lie more than 150 m away: coordinates are taken for "
         "metres in the lidar's frame, and these may be centimetres or millimetres, or in "
         "the frame of a map");
-  for (std::string& remark : remarks_on_scans(*this)) remarks.push_back(std::move(remark));
+  for (std::string& remark : remarks_on_scans(*this, is_mount_known))
+    remarks.push_back(std::move(remark));
   return remarks;
 }
 

@@ -52,8 +52,8 @@ class ScanDataset {
   /// What was understood or taken for granted, in words: from which fields of a typical scan its
   /// intensity, times and rings are; that files without a stamp in their names follow each other
   /// by 0.1 s; that its coordinates can be no metres; what remarks_on_scans() says. Empty where
-  /// nothing is open.
-  [[nodiscard]] std::vector<std::string> remarks() const;
+  /// nothing is open. Reads scans.
+  [[nodiscard]] std::vector<std::string> remarks(bool is_mount_known = false) const;
 
   /// Every file that it is read from: those of the scans, what lies beside them, and the text files
   /// of a sequence. For scans of a source: the names that it gives them.

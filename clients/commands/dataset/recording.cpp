@@ -11,9 +11,10 @@ namespace stillmap::cli {
 namespace {
 
 dds::Recording opened(const std::string& path, const std::string& topic,
-                      std::optional<LabelKind> label_kind, const PointFieldNames& fields = {}) {
+                      std::optional<LabelKind> label_kind, const PointFieldNames& fields = {},
+                      bool is_mount_known = false) {
   dds::Recording recording = dds::open_recording(path, topic, label_kind, fields);
-  for (const auto& sentences : {recording.faults, recording.dataset.remarks()})
+  for (const auto& sentences : {recording.faults, recording.dataset.remarks(is_mount_known)})
     for (const std::string& sentence : sentences) std::cerr << "stillmap: " << sentence << "\n";
   return recording;
 }
@@ -55,11 +56,14 @@ ScanDataset open_recording(const std::string& path, const std::string& topic) {
 }
 
 dds::Recording open_recording(const std::string& path, const RecordingArguments& recording,
-                              const std::string& config_file, bool is_strict) {
-  InputConfig input;
-  if (!config_file.empty()) input = load_server_config(config_file).input;
-  dds::Recording found =
-      opened(path, recording.topic_in, label_kind_of(recording, input), input.fields);
+                              const std::string& config_file, bool is_strict, bool is_mount_given) {
+  const ServerConfig server =
+      config_file.empty() ? ServerConfig{} : load_server_config(config_file);
+  const InputConfig& input = server.input;
+  const bool is_mount_known =
+      is_mount_given || !server.frames.base.empty() || !server.lidars.empty();
+  dds::Recording found = opened(path, recording.topic_in, label_kind_of(recording, input),
+                                input.fields, is_mount_known);
   if (is_strict && !found.lost_parts.empty()) {
     throw DatasetError(
         path, "is not read as a whole, which --strict asks for: " + found.lost_parts.front());

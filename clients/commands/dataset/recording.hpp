@@ -27,12 +27,13 @@ void add_recording_options(CommandHandle command, RecordingArguments& recording)
 
 /// The same, with labels of the kind that the command line says, else of `input.label_kind` in
 /// `config_file`, where there is one, and fields by the names of `input.fields` there; says how
-/// many labels are of no known id. Throws ConfigError, too, and DatasetError where `is_strict` and
-/// a part of a bag is missing, damaged, or left out.
+/// many labels are of no known id. Of other axes nothing is said where the command line
+/// (`is_mount_given`) or the file tells how the lidar hangs. Throws ConfigError, too, and
+/// DatasetError where `is_strict` and a part of a bag is missing, damaged, or left out.
 [[nodiscard]] dds::Recording open_recording(const std::string& path,
                                             const RecordingArguments& recording,
                                             const std::string& config_file = {},
-                                            bool is_strict = false);
+                                            bool is_strict = false, bool is_mount_given = false);
 
 /// Throws std::invalid_argument, with the ways out, where labels are read as SemanticKITTI ids and
 /// look like something else.

@@ -299,7 +299,8 @@ std::optional<FrameTransform> mount_of(const ReplayArguments& arguments) {
 
 ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
   const ScanDataset dataset =
-      open_recording(arguments.dataset, arguments.recording, {}, arguments.replay.range.strict)
+      open_recording(arguments.dataset, arguments.recording, {}, arguments.replay.range.strict,
+                     !arguments.mount.xyz_rpy.empty())
           .dataset;
   if (arguments.replay.with_labels) warn_of_label_kind(dataset);
   (void)arguments.replay.range.end(dataset);

@@ -260,9 +260,10 @@ void write_picture(const std::string& file, const std::vector<LocalizedScan>& sc
 ExitCode run(const LocalizeArguments& arguments) {
   StopSignal stop;
   const SearchableMap map = load_map(arguments.map);
-  const ScanDataset dataset = open_recording(arguments.dataset, arguments.recording,
-                                             arguments.mapper.config_file, arguments.range.strict)
-                                  .dataset;
+  const ScanDataset dataset =
+      open_recording(arguments.dataset, arguments.recording, arguments.mapper.config_file,
+                     arguments.range.strict, !arguments.mount.xyz_rpy.empty())
+          .dataset;
   const std::size_t end = arguments.range.end(dataset);
   const Localizer localizer(map.index);
   LocalizationRun run(dataset, arguments, localizer);

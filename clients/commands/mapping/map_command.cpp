@@ -358,8 +358,9 @@ ExitCode stopped_early(const MapOutputFolder& out, const std::string& what_is_th
 
 ExitCode run(const MapArguments& arguments) {
   StopSignal stop;
-  const dds::Recording recording = open_recording(
-      arguments.dataset, arguments.recording, arguments.mapper.config_file, arguments.range.strict);
+  const dds::Recording recording =
+      open_recording(arguments.dataset, arguments.recording, arguments.mapper.config_file,
+                     arguments.range.strict, !arguments.mount.xyz_rpy.empty());
   const ScanDataset& dataset = recording.dataset;
   MappingTask task{.dataset = dataset,
                    .range = arguments.range,
