@@ -1,6 +1,7 @@
 #include "core/dataset/kitti_sequence_writer.hpp"
 
 #include <cstdio>
+#include <fstream>
 #include <string>
 #include <system_error>
 
@@ -55,6 +56,9 @@ KittiSequenceWriter::KittiSequenceWriter(const std::filesystem::path& folder) : 
                                    "); name another folder or remove this one");
   }
   make_folder(folder / "velodyne");
+  std::ofstream axes(folder / axes_file_name);
+  axes << "x ahead, y left, z up\n";
+  if (!axes.flush()) throw DatasetWriteError(folder / axes_file_name, "cannot be written");
 }
 
 void KittiSequenceWriter::add(const Scan& scan, std::span<const std::uint32_t> raw_labels,

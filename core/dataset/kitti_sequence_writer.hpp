@@ -15,9 +15,12 @@ namespace stillmap {
 
 /// Files and folders beside one another that are read as one sequence.
 inline constexpr std::array sequence_parts{
-    "velodyne",  "labels",    "labels.bak", "rings",           "time_offsets",
-    "calib.txt", "times.txt", "poses.txt",  "poses_lidar.txt", "imu.csv",
-    "imu.txt",   "gnss.csv",  "sensor.yaml"};
+    "velodyne",  "labels",    "labels.bak",  "rings",           "time_offsets",
+    "calib.txt", "times.txt", "poses.txt",   "poses_lidar.txt", "imu.csv",
+    "imu.txt",   "gnss.csv",  "sensor.yaml", "axes.txt"};
+
+/// Says that points have our axes (x ahead, y left, z up), whatever names say.
+inline constexpr const char* axes_file_name = "axes.txt";
 
 /// The first of them that the folder holds; empty where it holds none.
 [[nodiscard]] std::filesystem::path part_of_sequence_in(const std::filesystem::path& folder);
@@ -25,7 +28,8 @@ inline constexpr std::array sequence_parts{
 /// Writes scans as a SemanticKITTI sequence: velodyne/, labels/, calib.txt, times.txt and
 /// poses.txt (camera frame, relative to the first scan, as KITTI has it). What .bin cannot hold
 /// goes into files of our own that ScanDataset reads back: time_offsets/NNNNNN.bin (float32 a
-/// point, seconds) and rings/NNNNNN.bin (uint16 a point).
+/// point, seconds) and rings/NNNNNN.bin (uint16 a point). axes.txt says that the points have our
+/// axes, so that what `PointFieldNames` put right once is not turned back.
 class KittiSequenceWriter {
  public:
   /// Makes the folders. Throws DatasetError when that fails or `folder` holds a part of a

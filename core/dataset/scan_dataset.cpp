@@ -1,12 +1,9 @@
 #include "core/dataset/scan_dataset.hpp"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <numbers>
 #include <string>
-#include <system_error>
 #include <utility>
 
 #include "core/dataset/binary_file.hpp"
@@ -16,6 +13,7 @@
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/kitti_sequence_writer.hpp"
 #include "core/dataset/point_cloud_files.hpp"
+#include "core/dataset/scan_files.hpp"
 #include "core/dataset/scan_remarks.hpp"
 #include "core/lidar/measured_elevation.hpp"
 #include "core/lidar/point_fields.hpp"
@@ -28,121 +26,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::int64_t default_period_ns = 100'000'000;
-
-constexpr std::array scan_endings{".bin", ".pcd", ".ply"};
-
-bool is_scan_file(const fs::path& file, std::string_view ending) {
-  std::error_code error;
-  return ending_of(file) == ending && fs::is_regular_file(file, error);
-}
-
-/// By the stamps that names carry ("12.5" after "12.25"); where one carries none, in natural order.
-std::vector<fs::path> sorted(std::vector<fs::path> files) {
-  struct Stamped {
-    std::int64_t stamp_ns = 0;
-    std::size_t place = 0;
-  };
-  std::ranges::sort(files, [](const fs::path& a, const fs::path& b) {
-    return natural_less(a.filename().string(), b.filename().string());
-  });
-  std::vector<Stamped> stamped;
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    const auto stamp_ns = stamp_ns_from_name(files[i].stem().string());
-    if (!stamp_ns) return files;
-    stamped.push_back({*stamp_ns, i});
-  }
-  std::ranges::stable_sort(stamped, {}, &Stamped::stamp_ns);
-  std::vector<fs::path> ordered;
-  for (const Stamped& one : stamped) ordered.push_back(std::move(files[one.place]));
-  return ordered;
-}
-
-/// The files of one kind, in order: of the kind that the folder has most of, as calibrations and
-/// maps may lie beside scans.
-std::vector<fs::path> scans_in(const fs::path& folder) {
-  std::vector<fs::path> most;
-  for (const std::string_view ending : scan_endings) {
-    std::vector<fs::path> files;
-    for (const auto& entry : fs::directory_iterator(folder)) {
-      if (is_scan_file(entry.path(), ending)) files.push_back(entry.path());
-    }
-    if (files.size() > most.size()) most = std::move(files);
-  }
-  return sorted(std::move(most));
-}
-
-/// The way out where scans may lie in files of another kind, of which it has any.
-std::string other_files_in(const fs::path& folder) {
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    std::error_code error;
-    const std::string ending = ending_of(entry.path());
-    if (!ending.empty() && fs::is_regular_file(entry.path(), error))
-      return ", but " + ending.substr(0, 40) +
-             "; of scans in these, write x y z intensity as float32 to .bin files (numpy's tofile)";
-  }
-  return {};
-}
-
-std::vector<fs::path> scans_of(const fs::path& path) {
-  std::error_code error;
-  if (!fs::exists(path, error)) throw DatasetError(path, "no such file or folder; check the path");
-  if (!fs::is_directory(path, error)) {
-    const bool known = std::ranges::any_of(
-        scan_endings, [&](const char* ending) { return is_scan_file(path, ending); });
-    if (known) return {path};
-    throw DatasetError(path,
-                       "is no dataset; give a .bin, .pcd or .ply file, a folder "
-                       "of them, or a bag");
-  }
-  const fs::path velodyne = path / "velodyne";
-  const bool sequence = fs::is_directory(velodyne, error);
-  std::vector<fs::path> files;
-  try {
-    files = scans_in(sequence ? velodyne : path);
-  } catch (const fs::filesystem_error& fault) {
-    throw DatasetError(path, std::string("cannot be read: ") + fault.what());
-  }
-  if (files.empty()) {
-    const fs::path& folder = sequence ? velodyne : path;
-    throw DatasetError(folder, "holds no .bin, .pcd or .ply file" + other_files_in(folder) +
-                                   "; or give the folder that does, or the one above velodyne/");
-  }
-  return files;
-}
-
-/// Line of each scan in the sequence's text files: the number in its name, so that a cut-out of a
-/// sequence keeps its times and poses; the place in the folder where names are not numbers.
-std::vector<std::size_t> lines_of(const std::vector<fs::path>& files) {
-  std::vector<std::size_t> lines;
-  for (const fs::path& file : files) {
-    const std::string stem = file.stem().string();
-    std::size_t line = 0;
-    const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), line);
-    if (error != std::errc{} || end != stem.data() + stem.size()) break;
-    lines.push_back(line);
-  }
-  if (lines.size() == files.size()) return lines;
-  lines.resize(files.size());
-  for (std::size_t i = 0; i < files.size(); ++i) lines[i] = i;
-  return lines;
-}
-
-/// Checks that a text file of a sequence reaches to all scans. A file that has exactly one line a
-/// scan belongs to them in order, whatever the names say.
-std::vector<std::size_t> lines_in(const fs::path& file, const std::vector<std::size_t>& by_name,
-                                  std::size_t present, const std::vector<fs::path>& scans) {
-  const auto last = std::ranges::max_element(by_name);
-  if (*last < present) return by_name;
-  if (present != by_name.size()) {
-    const fs::path& scan = scans[static_cast<std::size_t>(last - by_name.begin())];
-    throw DatasetError(file, "has " + std::to_string(present) + " lines, but scan " +
-                                 scan.stem().string() + " needs line " + std::to_string(*last + 1) +
-                                 "; take the file that belongs to this sequence");
-  }
-  std::vector<std::size_t> in_order(present);
-  for (std::size_t i = 0; i < present; ++i) in_order[i] = i;
-  return in_order;
-}
 
 /// Nothing where one of the names carries none.
 std::optional<std::vector<std::int64_t>> stamps_from_names(const std::vector<fs::path>& files) {
@@ -216,6 +99,7 @@ ScanDataset::ScanDataset(const fs::path& path, std::optional<LabelKind> label_ki
   if (files_.front().parent_path().filename() == "velodyne") {
     sequence_ = files_.front().parent_path().parent_path();
   }
+  settle_axes();
   const fs::path times = sequence_ / "times.txt";
   if (!sequence_.empty() && fs::exists(times)) {
     const auto [times_ns, unit] = read_kitti_times(times);
@@ -243,6 +127,22 @@ ScanDataset::ScanDataset(std::shared_ptr<const ScanSource> source,
   learn_from_sample();
 }
 
+void ScanDataset::settle_axes() {
+  const PointFieldNames own;
+  if (fields_.x == own.x && fields_.y == own.y && fields_.z == own.z) return;
+  // What was put right when it was written is not turned back.
+  are_axes_ours_ = !sequence_.empty() && fs::exists(sequence_ / axes_file_name);
+  if (are_axes_ours_) {
+    fields_.x = own.x;
+    fields_.y = own.y;
+    fields_.z = own.z;
+  }
+  if (ending_of(files_.front()) == ".bin" && !are_axes(axes_by(fields_)))
+    throw DatasetError(files_.front(),
+                       "has x, y and z by their order, and the names of these in 'fields' do not "
+                       "take each of them once, with or without '-'");
+}
+
 std::vector<std::size_t> ScanDataset::sample() const {
   constexpr std::size_t max_samples = 9;
   const std::size_t count = std::min(max_samples, size());
@@ -256,7 +156,7 @@ std::vector<std::size_t> ScanDataset::sample() const {
 BinLayout ScanDataset::find_bin_layout() const {
   if (ending_of(files_.front()) != ".bin") return BinLayout::kitti;
   // What we wrote ourselves.
-  for (const char* folder : {"rings", "time_offsets"})
+  for (const char* folder : {"rings", "time_offsets", axes_file_name})
     if (!sequence_.empty() && fs::exists(sequence_ / folder)) return BinLayout::kitti;
   std::vector<fs::path> files;
   for (const std::size_t i : sample()) files.push_back(file(i));
@@ -359,6 +259,10 @@ std::vector<std::string> ScanDataset::remarks(bool is_mount_known) const {
   std::vector<std::string> remarks;
   if (!format_.empty()) remarks.push_back("points have " + format_);
   if (const std::string remark = remark_on_times(); !remark.empty()) remarks.push_back(remark);
+  if (are_axes_ours_)
+    remarks.push_back(std::string(axes_file_name) +
+                      " says that its points are x ahead, y left and z up already: the names of "
+                      "these in 'fields' are not applied");
   if (is_too_large_)
     remarks.push_back(
         "half of the points lie more than 150 m away: coordinates are taken for "
@@ -484,6 +388,10 @@ std::optional<Trajectory> ScanDataset::truth() const {
     }
     T_map_lidar = lidar_poses_from_camera(T_map_lidar, read_kitti_calibration(calibration));
   }
+  // The file's poses are of the axes that its points have there.
+  const Eigen::Matrix3d axes = axes_by(fields_).cast<double>();
+  if (are_axes(axes.cast<float>()))
+    for (Eigen::Isometry3d& T : T_map_lidar) T = about_other_axes(T, axes);
   Trajectory trajectory;
   const auto lines = lines_in(pose_file, lines_, T_map_lidar.size(), files_);
   for (std::size_t i = 0; i < lines.size(); ++i) {

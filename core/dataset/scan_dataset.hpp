@@ -23,7 +23,7 @@ namespace stillmap {
 /// A dataset on disk, read scan by scan:
 /// - a SemanticKITTI sequence: velodyne/*.bin, and where present labels/*.label, times.txt,
 ///   calib.txt and poses.txt (camera frame) or poses_lidar.txt (lidar frame), and our own
-///   time_offsets/ and rings/ (see KittiSequenceWriter);
+///   time_offsets/, rings/ and axes.txt (see KittiSequenceWriter);
 /// - a folder of .bin (KITTI's or nuScenes': see BinLayout), .pcd or .ply files, of the kind that
 ///   it has most of, in the order of the stamps in their names, else in natural order ("2" before
 ///   "10");
@@ -78,9 +78,10 @@ class ScanDataset {
   /// The same without the corrections of kitti_lidar(): points as they are in the file.
   [[nodiscard]] DatasetFrame read_uncorrected(std::size_t i) const;
 
-  /// True poses, one a scan, in the lidar frame of the pose file's first line; nothing without a
-  /// pose file. Throws DatasetError when it is damaged, or has too few lines; before that
-  /// CameraUnknownError when it is in the camera's frame and no calib.txt tells where that is.
+  /// True poses, one a scan, in the lidar frame of the pose file's first line, along the axes that
+  /// the names of x, y and z put its points to; nothing without a pose file. Throws DatasetError
+  /// when it is damaged, or has too few lines; before that CameraUnknownError when it is in the
+  /// camera's frame and no calib.txt tells where that is.
   [[nodiscard]] std::optional<Trajectory> truth() const;
 
   /// Samples of an IMU by the scans' clock: imu.csv or imu.txt beside velodyne/ or the scans' files
@@ -108,6 +109,8 @@ class ScanDataset {
 
   /// A few scans from all over the dataset.
   [[nodiscard]] std::vector<std::size_t> sample() const;
+  /// Throws DatasetError where names of x, y and z make no axes of a .bin file's.
+  void settle_axes();
   /// Of .bin files; throws DatasetError (see bin_layout_of()).
   [[nodiscard]] BinLayout find_bin_layout() const;
   /// Takes scale, sensor and whether there are labels from them.
@@ -136,6 +139,8 @@ class ScanDataset {
   float intensity_scale_ = 1.0F;
   bool has_labels_ = false;
   bool lacks_labels_ = false;
+  /// Its writer said so, and names of x, y and z count no more.
+  bool are_axes_ours_ = false;
   BinLayout bin_layout_ = BinLayout::kitti;
   /// Half of the points of a typical scan lie farther away than any lidar sees.
   bool is_too_large_ = false;

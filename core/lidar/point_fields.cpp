@@ -199,6 +199,15 @@ Eigen::Matrix3f axes_by(const PointFieldNames& names) {
   return axes;
 }
 
+bool are_axes(const Eigen::Matrix3f& axes) { return std::abs(axes.determinant()) == 1.0F; }
+
+Eigen::Isometry3d about_other_axes(const Eigen::Isometry3d& T, const Eigen::Matrix3d& axes) {
+  Eigen::Isometry3d other = Eigen::Isometry3d::Identity();
+  other.linear() = axes * T.linear() * axes.transpose();
+  other.translation() = axes * T.translation();
+  return other;
+}
+
 std::string axes_in_words(const PointFieldNames& names) {
   const PointFieldNames own;
   if (names.x == own.x && names.y == own.y && names.z == own.z) return {};

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -40,8 +40,15 @@ struct CoordinateField {
 [[nodiscard]] CoordinateField coordinate_field(const std::string& name);
 
 /// What takes points whose coordinates have no names but their order to the axes that `names` say:
-/// each from the first name that is x, y or z, with or without "-".
+/// each from the first name that is x, y or z, with or without "-". Names that take one of these
+/// twice make no axes (are_axes()).
 [[nodiscard]] Eigen::Matrix3f axes_by(const PointFieldNames& names);
+[[nodiscard]] bool are_axes(const Eigen::Matrix3f& axes);
+
+/// The motion T of a lidar along other axes, which may be mirrored: `axes` takes points from its
+/// own to these.
+[[nodiscard]] Eigen::Isometry3d about_other_axes(const Eigen::Isometry3d& T,
+                                                 const Eigen::Matrix3d& axes);
 
 /// "x from z, y from -x, z from y, ", or nothing where each is its own.
 [[nodiscard]] std::string axes_in_words(const PointFieldNames& names);

@@ -75,11 +75,55 @@ TEST(ScanDatasetUnits, ThatCanBeNoMetresAreTold) {
 TEST(ScanDataset, TakesCoordinatesOfBinFilesToTheAxesThatNamesSay) {
   const ScratchFolder folder;
   (void)sequence_with_times(folder, "0.0\n0.1\n0.2\n");
+  const std::filesystem::path sequence = folder.path() / "sequence";
   PointFieldNames names;
   names.y = {"-y"};
-  const ScanDataset dataset(folder.path() / "sequence", {}, names);
+  // What we wrote has our axes, and keeps them.
+  const ScanDataset written(sequence, {}, names);
+  EXPECT_EQ(written.read(0).scan.points_lidar.front(), Eigen::Vector3f(1.0F, 2.0F, 3.0F));
+  EXPECT_THAT(written.remarks(), Contains(HasSubstr("axes.txt says")));
+  std::filesystem::remove(sequence / "axes.txt");
+  const ScanDataset dataset(sequence, {}, names);
   EXPECT_EQ(dataset.read(0).scan.points_lidar.front(), Eigen::Vector3f(1.0F, -2.0F, 3.0F));
   EXPECT_THAT(dataset.remarks(), Contains(HasSubstr("y from -y")));
+  names.y = {"left"};
+  names.z = {"x"};
+  EXPECT_THAT(message_of<DatasetError>([&] { (void)ScanDataset(sequence, {}, names); }),
+              HasSubstr("take each of them once"));
+}
+
+// Points that stand still in the world do so after the axes are put right, too.
+TEST(ScanDataset, TakesTruePosesToTheAxesThatNamesSay) {
+  PointFieldNames turned, mirrored;
+  turned.y = {"-y"};
+  turned.z = {"-z"};
+  mirrored.y = {"-y"};
+  Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
+  T_map_lidar.translation() = Eigen::Vector3d(3.0, 1.0, 0.5);
+  T_map_lidar.rotate(Eigen::AngleAxisd(0.4, Eigen::Vector3d(0.1, 0.2, 1.0).normalized()));
+  const Eigen::Vector3d landmark(7.0, -2.0, 1.0);
+  const ScratchFolder folder;
+  KittiSequenceWriter writer(folder.path() / "sequence");
+  for (const auto& T : {Eigen::Isometry3d::Identity(), T_map_lidar}) {
+    Scan scan;
+    scan.points_lidar = {(T.inverse() * landmark).cast<float>()};
+    scan.intensity = {0.5F};
+    writer.add(scan, {}, T);
+  }
+  writer.finish();
+  std::filesystem::remove(folder.path() / "sequence/axes.txt");
+  for (const PointFieldNames& names : {turned, mirrored}) {
+    const ScanDataset dataset(folder.path() / "sequence", {}, names);
+    const Trajectory truth = dataset.truth().value();
+    EXPECT_NEAR(truth[1].T_map_lidar.linear().determinant(), 1.0, 1e-9);
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Eigen::Vector3d point = dataset.read(i).scan.points_lidar.front().cast<double>();
+      EXPECT_LT(
+          (truth[i].T_map_lidar * point - dataset.read(0).scan.points_lidar.front().cast<double>())
+              .norm(),
+          1e-4);
+    }
+  }
 }
 
 TEST(ScanDataset, SaysWhatBecomesOfFilesOfOtherKinds) {
@@ -89,6 +133,8 @@ TEST(ScanDataset, SaysWhatBecomesOfFilesOfOtherKinds) {
   };
   EXPECT_THAT(fault(), testing::Not(HasSubstr("but")));
   (void)folder.file("0.npy", "numbers");
+  (void)folder.file("1.npy", "numbers");
+  (void)folder.file("a.txt", "notes");
   EXPECT_THAT(fault(), HasSubstr("but .npy; of scans in these, write x y z intensity as float32"));
 }
 

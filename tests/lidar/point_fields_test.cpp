@@ -260,6 +260,9 @@ TEST(AxesBy, NamesTurnsAndMirrorsPoints) {
   PointFieldNames other;
   other.x = {"-forward", "", "-"};
   EXPECT_TRUE(axes_by(other).isIdentity(0.0F));
+  EXPECT_TRUE(are_axes(axes_by(unity)));
+  unity.y = {"left"};
+  EXPECT_FALSE(are_axes(axes_by(unity)));
 }
 
 TEST(PointTimes, OfACounterThatBeginsAnewWithinTheScanGoOn) {
