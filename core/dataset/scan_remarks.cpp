@@ -104,13 +104,15 @@ bool is_looked_round(const std::vector<Eigen::Vector3f>& points) {
 }
 
 /// Whether what looks like ground may be a ceiling: it reaches no farther than a room, or there is
-/// a floor opposite, however little of it is seen, or nothing is looked at there.
-bool may_be_ceiling(const std::vector<Eigen::Vector3f>& up, const Below& ground,
-                    const Below& opposite) {
-  constexpr double min_share_far = 0.12, some_floor = 0.02, min_share_opposite = 0.02;
+/// a floor opposite, however little of it is seen, or nothing is looked at there. What a few beams
+/// see of the world at the lidar's height is level, too, but not as deep as a floor.
+bool may_be_ceiling(const std::vector<Eigen::Vector3f>& up,
+                    const std::vector<Eigen::Vector3f>& down, const Below& ground) {
+  constexpr double min_share_far = 0.12, some_floor = 0.06, min_share_opposite = 0.02;
   const auto above =
       std::ranges::count_if(up, [](const Eigen::Vector3f& p) { return p.z() > any_depth_m; });
-  return ground.share_far < min_share_far || opposite.share_on_plane > some_floor ||
+  return ground.share_far < min_share_far ||
+         below(down, ground_depth_m).share_on_plane > some_floor ||
          static_cast<double>(above) < min_share_opposite * static_cast<double>(up.size());
 }
 
@@ -145,7 +147,7 @@ std::optional<std::string> other_up_axis(std::span<const Eigen::Vector3f> points
     const Below ground = below(up, ground_depth_m), opposite = below(down, any_depth_m);
     if (!is_ground(ground) || opposite.share_on_plane > some_ground || !is_looked_round(up))
       continue;
-    if (axis.order[2] == 2 && may_be_ceiling(up, ground, opposite)) continue;
+    if (axis.order[2] == 2 && may_be_ceiling(up, down, ground)) continue;
     return axis.name;
   }
   return std::nullopt;

@@ -127,10 +127,17 @@ TEST(OtherUpAxis, IsNotGuessedFromCeilingsAndWalls) {
     EXPECT_EQ(other_up_axis(beside_a_wall), std::nullopt) << floor_m;
   }
   // Those that see little of the floor, or nothing, in rooms and halls.
-  for (const double size : {1.0, 2.0, 5.0}) {
-    const Room room{.long_m = 8.0 * size, .wide_m = 6.0 * size};
-    EXPECT_EQ(other_up_axis(in_room(room, -7.0, 52.0)), std::nullopt) << size;
-    EXPECT_EQ(other_up_axis(in_room(room, 0.0, 89.0)), std::nullopt) << size;
+  for (const double size : {1.0, 1.5, 2.0, 3.0, 5.0, 8.0}) {
+    for (const double floor_m : {0.5, 1.0, 1.5}) {
+      for (const double ceiling_m : {1.0, 1.8, 3.0}) {
+        const Room room{
+            .long_m = 8.0 * size, .wide_m = 6.0 * size, .floor_m = floor_m, .ceiling_m = ceiling_m};
+        EXPECT_EQ(other_up_axis(in_room(room, -7.0, 52.0)), std::nullopt)
+            << size << " " << floor_m << " " << ceiling_m;
+        EXPECT_EQ(other_up_axis(in_room(room, 0.0, 89.0)), std::nullopt)
+            << size << " " << floor_m << " " << ceiling_m;
+      }
+    }
   }
   // Forward ones before a wall.
   for (const double wall_m : {0.6, 1.5, 3.5}) {
