@@ -132,7 +132,7 @@ std::size_t voxels_near(const MapSnapshot& view, const Eigen::Vector3d& position
 TEST(CrowdedDrives, MapWhatWasSeenWhileThePlaceWasInDoubt) {
   SimulationConfig config = crowded_street();
   config.seed = 502;
-  config.scans = 310;
+  config.scans = 450;
   config.rolling = true;
   constexpr int before_doubt = 30;
   const Simulation simulation(config);
