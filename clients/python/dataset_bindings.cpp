@@ -130,6 +130,18 @@ void require_semantic_kitti_labels(const ScanDataset& dataset, const std::filesy
                                "which does no harm where the labels are not used");
 }
 
+std::vector<ImuSample> imu_of(SharedRecording& shared) {
+  const py::gil_scoped_release released;
+  const std::scoped_lock lock(shared.reading);
+  return shared.recording.dataset.imu();
+}
+
+std::vector<std::string> remarks_of(SharedRecording& shared) {
+  const py::gil_scoped_release released;
+  const std::scoped_lock lock(shared.reading);
+  return shared.recording.dataset.remarks();
+}
+
 void bind_open_dataset(py::module_& module) {
   module.def(
       "open_dataset",
@@ -188,28 +200,14 @@ void bind_dataset(py::module_& module) {
           },
           "True poses of the lidar in the frame of the first one, or None.")
       .def_property_readonly(
-          "imu",
-          [](SharedRecording& shared) {
-            std::vector<ImuSample> samples;
-            {
-              const py::gil_scoped_release released;
-              const std::scoped_lock lock(shared.reading);
-              samples = shared.recording.dataset.imu();
-            }
-            return imu_arrays(samples);
-          },
+          "imu", [](SharedRecording& shared) { return imu_arrays(imu_of(shared)); },
           "(stamp_ns (n,) int64, angular_velocity_imu (n, 3) [rad/s], acceleration_imu (n, 3) "
           "[m/s^2]).")
       .def_property_readonly(
           "faults", [](const SharedRecording& shared) { return shared.recording.faults; },
           "What of a bag cannot be read at all, in words.")
       .def_property_readonly(
-          "remarks",
-          [](SharedRecording& shared) {
-            const py::gil_scoped_release released;
-            const std::scoped_lock lock(shared.reading);
-            return shared.recording.dataset.remarks();
-          },
+          "remarks", &remarks_of,
           "What was understood or taken for granted, in words: from which fields intensity, times "
           "and rings are; that files whose names tell no time follow each other by 0.1 s; that "
           "coordinates can be no metres; that scans are parts of a turn, or that another axis than "

@@ -194,10 +194,16 @@ TEST_F(BrokenSetup, WithTheServerInAnotherDomain) {
   domain_ = free_domain();
   // The doctor of another test may be there for a moment, looking for servers as this one does.
   const std::string here = " in domain " + std::to_string(domain_);
-  EXPECT_THAT(problems(),
-              Contains(AllOf(AnyOf(field("what", "nobody else is" + here),
-                                   field("what", "no server 'stillmap'" + here)),
-                             field("evidence", "domain " + std::to_string(servers_domain)))));
+  const auto names_the_servers_domain = Contains(AllOf(
+      AnyOf(field("what", "nobody else is" + here), field("what", "no server 'stillmap'" + here)),
+      field("evidence", "domain " + std::to_string(servers_domain))));
+  // It looks into twelve domains for a moment, and other tests have many.
+  std::vector<json> found;
+  for (int attempt = 0; attempt < 3; ++attempt) {
+    found = problems();
+    if (testing::Matches(names_the_servers_domain)(found)) break;
+  }
+  EXPECT_THAT(found, names_the_servers_domain);
 }
 
 TEST_F(BrokenSetup, WithSecurityOnOneSideOnly) {
