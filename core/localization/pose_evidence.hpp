@@ -29,8 +29,8 @@ struct PoseEvidence {
   double close = 0.0;
   /// What is too high to be traffic: of the map's, the share that the scan shows; times, of the
   /// scan's that has any of the map beside it, the share that lies on it. 1 where little is so
-  /// high. Parked vehicles that came change neither, nor does the end of the map; of lorries that left, what
-  /// was high counts as seen through.
+  /// high. Parked vehicles that came change neither, nor does the end of the map; of lorries that
+  /// left, what was high counts as seen through.
   double high_agreed = 1.0;
 
   /// 0..1; low where any of them is.

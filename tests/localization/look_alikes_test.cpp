@@ -133,7 +133,7 @@ TEST(LookAlikes, BesideTheMapAreNotTakenForWhatItHolds) {
 /// A place that only looks like the best one is no rival if it fits less closely; one that fits as
 /// closely is, and what fits loosely tells nothing apart.
 TEST(LookAlikes, AreJudgedByWhatIsClose) {
-  const auto status = [](double close, double other_close) {
+  const auto status = [](double close, double other_close, int other_map_points = 5000) {
     PlaceHypothesis best;
     best.evidence = {.explained = 0.95,
                      .confirmed = 1.0,
@@ -145,11 +145,33 @@ TEST(LookAlikes, AreJudgedByWhatIsClose) {
     PlaceHypothesis other = best;
     other.evidence.explained = 0.9;
     other.evidence.close = other_close;
+    other.evidence.map_points = other_map_points;
     return judge_places(std::vector{best, other}, LocalizationConfig{});
   };
   EXPECT_EQ(status(0.8, 0.4), LocalizationStatus::found);
   EXPECT_EQ(status(0.8, 0.7), LocalizationStatus::ambiguous);
   EXPECT_EQ(status(0.4, 0.1), LocalizationStatus::ambiguous);
+  EXPECT_EQ(status(0.8, 0.4, 3000), LocalizationStatus::ambiguous)
+      << "a place that the map knows thinly";
+}
+
+TEST(LookAlikes, OneThatHeightsDenyStaysARivalOfTheOneThatIsBelieved) {
+  PlaceHypothesis denied;
+  denied.evidence = {.explained = 0.95,
+                     .confirmed = 1.0,
+                     .level = 1.0,
+                     .scan_points = 500,
+                     .map_points = 5000,
+                     .level_points = 500};
+  PlaceHypothesis believed = denied;
+  believed.evidence.explained = 0.9;
+  denied.evidence.high_agreed = 0.5;
+  const LocalizationConfig config;
+  std::vector<PlaceHypothesis> places{denied, believed};
+  EXPECT_EQ(judge_places(places, config), LocalizationStatus::not_found);
+  put_believed_first(places, config);
+  EXPECT_EQ(places[0].evidence.explained, 0.9);
+  EXPECT_EQ(judge_places(places, config), LocalizationStatus::ambiguous);
 }
 
 }  // namespace

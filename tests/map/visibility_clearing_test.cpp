@@ -171,6 +171,8 @@ TEST_F(VisibilityClearing, IsDueWithEachOfTheFirstScansOfANewMap) {
   EXPECT_EQ(first, expected);
   map_.reset(2);
   EXPECT_EQ(see_when_due(wall, 24), expected);
+  map_.resume(*map_.view(), {});
+  EXPECT_EQ(see_when_due(wall, 8), (std::vector{3, 6})) << "a run that goes on";
   map_.reset(3);
   map_.begin_session();
   EXPECT_EQ(see_when_due(wall, 8), (std::vector{3, 6})) << "what was there is known";
