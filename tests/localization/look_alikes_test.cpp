@@ -11,6 +11,7 @@
 #include "core/map/query/tile_reader.hpp"
 #include "core/map/static_map.hpp"
 #include "tests/lidar/boxes.hpp"
+#include "tests/localization/driven_map.hpp"
 
 namespace stillmap::test {
 namespace {
@@ -74,29 +75,17 @@ class RowOfHouses : public Boxes {
   }
 };
 
-/// Off the axes, for rays that miss no plane.
 Eigen::Isometry3d pose_in_row(double x, double y, double heading_rad) {
-  return Eigen::Translation3d(x, y, lidar_height_in_row_m) *
-         Eigen::AngleAxisd(heading_rad, Eigen::Vector3d::UnitZ()) *
-         Eigen::AngleAxisd(0.003, Eigen::Vector3d::UnitX());
+  return pose_off_axes(x, y, lidar_height_in_row_m, heading_rad);
 }
 
 /// The map of a drive along it.
 std::shared_ptr<const PlaceIndex> index_of(const RowOfHouses& row) {
-  StaticMap map{StaticMapConfig{}};
-  map.reset(1);
-  SharedTrajectory path;
-  for (int k = 0; k < 100; ++k) {
-    LabelledScan scan;
-    const Eigen::Isometry3d T_map_lidar = pose_in_row(5.0 + 1.3 * k, 0.0, 0.002);
-    const std::int64_t stamp_ns = (k + 1) * 100'000'000LL;
-    scan.scan = row.scan_at(T_map_lidar, stamp_ns);
-    scan.motion.assign(scan.scan.size(), Motion::stationary);
-    map.insert(scan, T_map_lidar);
-    path.push_back({stamp_ns, T_map_lidar});
-  }
-  return std::make_shared<const PlaceIndex>(map.view(), path,
-                                            std::make_shared<TileReader>(nullptr));
+  return index_of_drive(
+      100, [](int k) { return pose_in_row(5.0 + 1.3 * k, 0.0, 0.002); },
+      [&](const Eigen::Isometry3d& T_map_lidar, std::int64_t stamp_ns) {
+        return row.scan_at(T_map_lidar, stamp_ns);
+      });
 }
 
 Eigen::Isometry3d place_in_row(int k) {

@@ -12,6 +12,7 @@
 #include "core/localization/localizer.hpp"
 #include "core/map/query/tile_reader.hpp"
 #include "core/map/static_map.hpp"
+#include "tests/localization/driven_map.hpp"
 
 namespace stillmap::test {
 namespace {
@@ -91,29 +92,17 @@ class SmoothStreet {
   std::vector<House> houses_;
 };
 
-/// Off the axes, for rays that miss no plane.
 Eigen::Isometry3d pose_in_street(double x, double y, double heading_rad) {
-  return Eigen::Translation3d(x, y, height_in_street_m) *
-         Eigen::AngleAxisd(heading_rad, Eigen::Vector3d::UnitZ()) *
-         Eigen::AngleAxisd(0.003, Eigen::Vector3d::UnitX());
+  return pose_off_axes(x, y, height_in_street_m, heading_rad);
 }
 
 /// The map of a drive from one end to the other.
 std::shared_ptr<const PlaceIndex> index_of(const SmoothStreet& street) {
-  StaticMap map{StaticMapConfig{}};
-  map.reset(1);
-  SharedTrajectory path;
-  for (int k = 0; k < 90; ++k) {
-    LabelledScan scan;
-    const Eigen::Isometry3d T_map_lidar = pose_in_street(10.0 + 1.2 * k, 0.0, 0.002);
-    const std::int64_t stamp_ns = (k + 1) * 100'000'000LL;
-    scan.scan = street.scan_at(T_map_lidar, stamp_ns);
-    scan.motion.assign(scan.scan.size(), Motion::stationary);
-    map.insert(scan, T_map_lidar);
-    path.push_back({stamp_ns, T_map_lidar});
-  }
-  return std::make_shared<const PlaceIndex>(map.view(), path,
-                                            std::make_shared<TileReader>(nullptr));
+  return index_of_drive(
+      90, [](int k) { return pose_in_street(10.0 + 1.2 * k, 0.0, 0.002); },
+      [&](const Eigen::Isometry3d& T_map_lidar, std::int64_t stamp_ns) {
+        return street.scan_at(T_map_lidar, stamp_ns);
+      });
 }
 
 /// The points of two scans do not meet, and the rings on a front lie best on those of the map.
