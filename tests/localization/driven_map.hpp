@@ -6,7 +6,9 @@
 #include <memory>
 
 #include "core/lidar/scan.hpp"
+#include "core/lidar/shared_trajectory.hpp"
 #include "core/localization/place_index.hpp"
+#include "core/map/query/tile_reader.hpp"
 #include "core/map/static_map.hpp"
 
 namespace stillmap::test {

@@ -8,10 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "core/lidar/shared_trajectory.hpp"
 #include "core/localization/localizer.hpp"
-#include "core/map/query/tile_reader.hpp"
-#include "core/map/static_map.hpp"
 #include "tests/localization/driven_map.hpp"
 
 namespace stillmap::test {
