@@ -439,8 +439,10 @@ Features extract_features(const Scan& scan, const FeatureConfig& config,
     std::span<std::uint32_t> ring = rings.ring(r);
     // A drop between points of a surface makes edges of these.
     if (!in_air.empty()) {
-      const auto drops = std::ranges::remove_if(ring, [&](std::uint32_t i) { return in_air[i]; });
-      ring = ring.first(ring.size() - drops.size());
+      // std::ranges::remove_if is nothing for clang 14, which compiles the fuzz targets.
+      const auto kept_end =
+          std::remove_if(ring.begin(), ring.end(), [&](std::uint32_t i) { return in_air[i]; });
+      ring = ring.first(static_cast<std::size_t>(kept_end - ring.begin()));
     }
     of_ring[r] = features_of_ring(scan, ring, config);
   });
