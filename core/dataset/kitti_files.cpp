@@ -14,6 +14,7 @@
 
 #include "core/dataset/binary_file.hpp"
 #include "core/dataset/file_stamp.hpp"
+#include "core/lidar/ranked_value.hpp"
 
 namespace stillmap {
 namespace {
@@ -189,10 +190,7 @@ double median_step(std::span<const std::int64_t> times) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < times.size(); ++i)
     steps.push_back(static_cast<double>(times[i]) - static_cast<double>(times[i - 1]));
-  if (steps.empty()) return 0.0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::ranges::nth_element(steps, middle);
-  return *middle;
+  return steps.empty() ? 0.0 : median_of(steps);
 }
 
 /// Whole numbers that are too large for seconds; nothing where one is none.

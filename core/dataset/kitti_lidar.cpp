@@ -9,6 +9,7 @@
 
 #include "core/lidar/measured_elevation.hpp"
 #include "core/lidar/prepare.hpp"
+#include "core/lidar/ranked_value.hpp"
 #include "core/lidar/rings.hpp"
 #include "core/lidar/sensor_model.hpp"
 
@@ -44,12 +45,6 @@ double azimuth(const Eigen::Vector3f& p) {
 }
 
 double distance(const Eigen::Vector3f& p) { return std::hypot(p.x(), p.y()); }
-
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 struct Weighted {
   double value;

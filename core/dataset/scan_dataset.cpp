@@ -17,6 +17,7 @@
 #include "core/dataset/scan_remarks.hpp"
 #include "core/lidar/measured_elevation.hpp"
 #include "core/lidar/point_fields.hpp"
+#include "core/lidar/ranked_value.hpp"
 #include "core/lidar/ring_numbering.hpp"
 #include "core/lidar/sensor_fit.hpp"
 
@@ -220,9 +221,7 @@ double ScanDataset::period_s() const {
   for (std::size_t i = 1; i < size(); ++i) steps_ns.push_back(stamp_ns(i) - stamp_ns(i - 1));
   const double usual_s = 1e-9 * static_cast<double>(default_period_ns);
   if (steps_ns.empty()) return usual_s;
-  const auto middle = steps_ns.begin() + static_cast<std::ptrdiff_t>(steps_ns.size() / 2);
-  std::ranges::nth_element(steps_ns, middle);
-  const double median_s = 1e-9 * static_cast<double>(*middle);
+  const double median_s = 1e-9 * static_cast<double>(median_of(steps_ns));
   // Recordings may leave scans out.
   return median_s > 0.5 * usual_s && median_s < 1.5 * usual_s ? median_s : usual_s;
 }

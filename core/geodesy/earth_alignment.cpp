@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "core/lidar/ranked_value.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -49,8 +51,7 @@ double squared_sigmas(const PointOnEarth& point, const Eigen::Isometry3d& T_enu_
 double median_sigma_m(std::span<const PointOnEarth> points) {
   std::vector<double> sigmas;
   for (const PointOnEarth& point : points) sigmas.push_back(point.sigma_m);
-  std::ranges::nth_element(sigmas, sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2));
-  return sigmas[sigmas.size() / 2];
+  return median_of(sigmas);
 }
 
 }  // namespace

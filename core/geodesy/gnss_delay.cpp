@@ -6,14 +6,13 @@
 #include <limits>
 #include <vector>
 
+#include "core/lidar/ranked_value.hpp"
+
 namespace stillmap {
 namespace {
 
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
 
-/// Between scans that are farther apart than both nobody knows where the antenna was.
-constexpr std::int64_t max_gap_ns = 1'500'000'000;
-constexpr double max_gap_m = 0.5;
 /// Of a stretch: long enough for a turn, short enough for odometry not to drift [m].
 constexpr double min_stretch_m = 100.0;
 constexpr std::size_t min_stretch_fixes = 12;
@@ -74,7 +73,7 @@ Place place_at(std::span<const PlanPose> way, std::int64_t stamp_ns) {
   const PlanPose& before = *std::prev(after);
   const Eigen::Vector2d step = after->antenna_odom - before.antenna_odom;
   const std::int64_t gap_ns = after->stamp_ns - before.stamp_ns;
-  if (gap_ns > max_gap_ns && step.norm() > max_gap_m) return {};
+  if (is_gap(gap_ns, step.norm())) return {};
   const double share =
       static_cast<double>(stamp_ns - before.stamp_ns) / static_cast<double>(gap_ns);
   return {before.antenna_odom + share * step, Eigen::Vector2d::Zero(),
@@ -109,11 +108,7 @@ class Stretches {
     }
     std::vector<double> sigmas;
     for (const PlanFix& fix : fixes_) sigmas.push_back(fix.sigma_m);
-    kernel_m_ = min_kernel_m;
-    if (sigmas.empty()) return;
-    const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
-    std::ranges::nth_element(sigmas, middle);
-    kernel_m_ = std::max(kernel_m_, *middle);
+    kernel_m_ = sigmas.empty() ? min_kernel_m : std::max(min_kernel_m, median_of(sigmas));
   }
 
   [[nodiscard]] std::size_t size() const { return ends_.size(); }

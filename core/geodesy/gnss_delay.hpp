@@ -41,6 +41,14 @@ struct GnssDelay {
   double antenna_sigma_m = 0.0;
 };
 
+/// Whether two scans after each other are so far apart, in time and in what the antenna moved, that
+/// nobody knows where it was between them.
+[[nodiscard]] constexpr bool is_gap(std::int64_t apart_ns, double way_m) {
+  constexpr std::int64_t max_apart_ns = 1'500'000'000;
+  constexpr double max_way_m = 0.5;
+  return apart_ns > max_apart_ns && way_m > max_way_m;
+}
+
 /// How late the stamps of a receiver are: the delay by which the fixes fit the way by odometry
 /// best, stretch by stretch, so that the drift of odometry has no part in it. Only turns and
 /// changes of speed tell: on a straight way at one speed, or on one circle, a delay is another

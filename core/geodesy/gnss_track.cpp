@@ -13,9 +13,6 @@ constexpr std::size_t max_scans = 50'000;
 constexpr std::size_t max_known = 50'000;
 /// Of stamps ahead of the scans, 50 s at 100 Hz.
 constexpr std::size_t max_waiting = 5000;
-/// Between scans that are farther apart than both nobody knows where the antenna was.
-constexpr std::int64_t max_gap_ns = 1'500'000'000;
-constexpr double max_gap_m = 0.5;
 /// Of a height that is not known: one that is said to be worse is taken for that [m].
 constexpr double unknown_sigma_m = 1e4;
 /// No robot goes so far between two fixes: they are of different places [m].
@@ -203,7 +200,7 @@ std::optional<PositionAtScan> GnssTrack::between_scans(const GnssFix& fix) const
     const ScanPose& before = *std::prev(after);
     const std::int64_t gap_ns = after->stamp_ns - before.stamp_ns;
     const Eigen::Vector3d way_odom = place_odom - antenna_odom(before);
-    if (gap_ns > max_gap_ns && way_odom.norm() > max_gap_m) return std::nullopt;
+    if (is_gap(gap_ns, way_odom.norm())) return std::nullopt;
     place_odom -=
         static_cast<double>(after->stamp_ns - time_ns) / static_cast<double>(gap_ns) * way_odom;
   }

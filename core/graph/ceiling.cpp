@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/lidar/ranked_value.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -75,9 +77,7 @@ std::vector<Column> columns_of(const PlacedSubmap& placed) {
 /// How high most of these are; nothing where less than `min_flat_share` and `min_cells` are.
 std::optional<float> one_height_m(std::vector<float> heights_m) {
   if (heights_m.size() < min_cells) return std::nullopt;
-  const auto middle = heights_m.begin() + static_cast<std::ptrdiff_t>(heights_m.size() / 2);
-  std::ranges::nth_element(heights_m, middle);
-  const float height_m = *middle;
+  const float height_m = median_of(heights_m);
   const auto same = static_cast<std::size_t>(std::ranges::count_if(
       heights_m, [height_m](float other_m) { return std::abs(other_m - height_m) <= same_m; }));
   const bool is_flat =

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "core/lidar/ranked_value.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -203,9 +205,7 @@ double median_height_off_m(std::span<const PositionOnWay> positions,
   std::vector<double> off_m;
   off_m.reserve(positions.size());
   for (const PositionOnWay& position : positions) off_m.push_back(height_off_m(position, up_odom));
-  const auto middle = off_m.begin() + static_cast<std::ptrdiff_t>(off_m.size() / 2);
-  std::ranges::nth_element(off_m, middle);
-  return *middle;
+  return median_of(off_m);
 }
 
 }  // namespace

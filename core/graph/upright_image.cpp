@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/lidar/ranked_value.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -179,9 +181,7 @@ std::optional<double> ground_offset_m(const UprightImage& a, const UprightImage&
       offsets.push_back(*lowest_a - p_b.z());
   }
   if (offsets.size() < min_cells) return std::nullopt;
-  const auto middle = offsets.begin() + static_cast<std::ptrdiff_t>(offsets.size() / 2);
-  std::ranges::nth_element(offsets, middle);
-  return *middle;
+  return median_of(offsets);
 }
 
 }  // namespace stillmap

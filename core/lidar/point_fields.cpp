@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/lidar/ranked_value.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -75,22 +77,11 @@ std::vector<double> unwrapped(std::span<const double> times) {
   return going_on;
 }
 
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 /// From the 5th to the 95th percentile, so that a few broken times do not count; in the unit of the
 /// times.
 double span_of(std::vector<double>& values) {
-  const auto at = [&](std::size_t percent) {
-    const auto place = values.begin() + static_cast<std::ptrdiff_t>(values.size() * percent / 100);
-    std::ranges::nth_element(values, place);
-    return *place;
-  };
-  const double low = at(5);
-  return at(95) - low;
+  const double low = ranked_value(values, values.size() * 5 / 100);
+  return ranked_value(values, values.size() * 95 / 100) - low;
 }
 
 /// The unit that makes a double a time between 1990 and 2100.
@@ -151,9 +142,7 @@ std::vector<float> sample_of(std::span<const float> intensity) {
 /// A percentile that a few bright or broken values do not move; 0 of no values.
 float bright_value(std::vector<float>& sample) {
   if (sample.empty()) return 0.0F;
-  const auto place = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() * 99 / 100);
-  std::ranges::nth_element(sample, place);
-  return *place;
+  return ranked_value(sample, sample.size() * 99 / 100);
 }
 
 float full_scale_above(float bright) {

@@ -11,6 +11,8 @@
 #include <limits>
 #include <span>
 
+#include "core/lidar/ranked_value.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -220,10 +222,7 @@ float median_time_s(const std::vector<float>& times_s) {
   const std::size_t step = times_s.size() / median_samples + 1;
   for (std::size_t i = 0; i < times_s.size(); i += step)
     if (std::isfinite(times_s[i])) sample.push_back(times_s[i]);
-  if (sample.empty()) return 0.0F;
-  const auto middle = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() / 2);
-  std::ranges::nth_element(sample, middle);
-  return *middle;
+  return sample.empty() ? 0.0F : median_of(sample);
 }
 
 }  // namespace

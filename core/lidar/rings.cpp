@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/lidar/measured_elevation.hpp"
+#include "core/lidar/ranked_value.hpp"
 #include "core/lidar/ring_numbering.hpp"
 
 namespace stillmap {
@@ -103,12 +104,6 @@ struct StepsAtCuts {
     return std::min(from_next_beam, from_same_beam) < 0.5F * between_beams;
   }
 };
-
-float median_of(std::vector<float>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 /// `slopes` and `rings` are of the points that were measured, in their order.
 StepsAtCuts steps_at_cuts(std::span<const float> slopes, std::span<const std::uint16_t> rings,

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/lidar/measured_elevation.hpp"
+#include "core/lidar/ranked_value.hpp"
 #include "core/lidar/ring_numbering.hpp"
 #include "core/lidar/rings.hpp"
 
@@ -31,12 +32,6 @@ constexpr int bands = 40;
 /// A sensor's points lie inside its field of view but for noise and mounting.
 constexpr double margin = 1.0 * degree;
 constexpr std::size_t max_samples = 8192;
-
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 /// Elevations of the measured points of every ring, in the field's own order. Empty for a field of
 /// more rings than a sensor can have, which is something else.

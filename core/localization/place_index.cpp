@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/lidar/ranked_value.hpp"
 #include "core/map/voxel_grid.hpp"
 
 namespace stillmap {
@@ -263,9 +264,7 @@ void PlaceIndex::fit_ground(const Floors& floors, const std::vector<float>& path
   std::vector<double> heights;
   for (std::size_t k = 0; k < nodes_.size(); ++k)
     if (is_fitted[k] != 0) heights.push_back(nodes_[k].body_height_m);
-  const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2);
-  std::nth_element(heights.begin(), middle, heights.end());
-  const double usual_m = heights.empty() ? usual_body_height_m : *middle;
+  const double usual_m = heights.empty() ? usual_body_height_m : median_of(heights);
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
     if (is_fitted[k] != 0) continue;
     nodes_[k].ground.height_m = static_cast<double>(path_heights_m[k]) - usual_m;

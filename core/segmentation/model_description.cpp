@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/lidar/ranked_value.hpp"
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/segmentation_network.hpp"
 
@@ -56,9 +57,7 @@ double beams_by_step(const SensorModel& sensor, int usual_rows) {
   if (beams.size() < 2) return sensor.rings;
   std::vector<double> steps;
   for (std::size_t i = 1; i < beams.size(); ++i) steps.push_back(beams[i - 1] - beams[i]);
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::ranges::nth_element(steps, middle);
-  const double close = (sensor.fov_up - sensor.fov_down) / *middle;
+  const double close = (sensor.fov_up - sensor.fov_down) / median_of(steps);
   return std::max<double>(sensor.rings, std::min<double>(close, usual_rows));
 }
 

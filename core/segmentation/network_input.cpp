@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/lidar/ranked_value.hpp"
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/surface_slope.hpp"
 
@@ -55,13 +56,8 @@ std::optional<RemissionScale> remission_scale(std::span<const float> intensity,
   for (std::size_t i = 0; i < intensity.size(); i += step)
     if (std::isfinite(intensity[i])) sample.push_back(intensity[i]);
   if (sample.empty()) return std::nullopt;
-  const auto at_share = [&sample](std::size_t percent) {
-    const auto place =
-        sample.begin() + static_cast<std::ptrdiff_t>((sample.size() - 1) * percent / 100);
-    std::ranges::nth_element(sample, place);
-    return *place;
-  };
-  const float dark = at_share(10), bright = at_share(90);
+  const float dark = ranked_value(sample, (sample.size() - 1) * 10 / 100);
+  const float bright = ranked_value(sample, (sample.size() - 1) * 90 / 100);
   if (bright <= dark || bright <= 0.0F) return std::nullopt;
   // The same share of a normal distribution.
   constexpr std::size_t remission = index(InputChannel::remission);

@@ -15,6 +15,7 @@
 
 #include "core/lidar/measured_elevation.hpp"
 #include "core/lidar/range_image.hpp"
+#include "core/lidar/ranked_value.hpp"
 #include "core/segmentation/beam_origin.hpp"
 #include "core/segmentation/lidar_stance.hpp"
 #include "core/segmentation/model_error.hpp"
@@ -67,13 +68,9 @@ std::optional<std::pair<double, double>> field_of_view(std::span<const Eigen::Ve
     if (std::isfinite(elevation)) elevations.push_back(elevation);
   }
   if (elevations.empty()) return std::nullopt;
-  const auto at = [&](std::size_t place) {
-    const auto middle = elevations.begin() + static_cast<std::ptrdiff_t>(place);
-    std::ranges::nth_element(elevations, middle);
-    return *middle;
-  };
   const std::size_t cut = elevations.size() / 1000;
-  const std::pair field(at(cut), at(elevations.size() - 1 - cut));
+  const double lowest = ranked_value(elevations, cut);
+  const std::pair field(lowest, ranked_value(elevations, elevations.size() - 1 - cut));
   return field.second - field.first > least_rad ? std::optional(field) : std::nullopt;
 }
 

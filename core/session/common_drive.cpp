@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/lidar/ranked_value.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -40,13 +42,6 @@ struct Motion {
   double median_jump_m = 0.0;
 };
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 Motion motion_of(const Trajectory& path) {
   Motion motion;
   std::vector<Eigen::Vector3d> steps;
@@ -61,7 +56,7 @@ Motion motion_of(const Trajectory& path) {
     motion.jumps.push_back(is_told ? jump : Eigen::Vector3d(0.0, 0.0, 0.0));
     if (is_told) lengths_m.push_back(length_m);
   }
-  motion.median_jump_m = median(std::move(lengths_m));
+  motion.median_jump_m = lengths_m.empty() ? 0.0 : median_of(lengths_m);
   return motion;
 }
 

@@ -4,8 +4,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 #include <vector>
+
+#include "core/lidar/ranked_value.hpp"
 
 namespace stillmap {
 namespace {
@@ -62,9 +65,7 @@ bool stands_up(Column column) {
 float low_percentile(std::vector<float>& heights_m) {
   if (heights_m.empty()) return nan;
   // 10th percentile: reflections put single voxels below the ground.
-  const auto tenth = heights_m.begin() + static_cast<std::ptrdiff_t>(heights_m.size() / 10);
-  std::nth_element(heights_m.begin(), tenth, heights_m.end());
-  return *tenth;
+  return ranked_value(heights_m, heights_m.size() / 10);
 }
 
 float block_level(const ColumnGrid& columns, int x0, int y0, int size) {
@@ -90,10 +91,7 @@ float median_around(const CellGrid<float>& blocks_m, int x0, int y0) {
     }
   }
   if (count == 0) return nan;
-  const auto middle = heights_m.begin() + static_cast<std::ptrdiff_t>((count - 1) / 2);
-  std::nth_element(heights_m.begin(), middle,
-                   heights_m.begin() + static_cast<std::ptrdiff_t>(count));
-  return *middle;
+  return ranked_value(std::span(heights_m).first(count), (count - 1) / 2);
 }
 
 /// The surface that begins with the voxel at `first`.
@@ -153,10 +151,7 @@ bool is_outlier(const GroundGrid& ground, int x0, int y0) {
   }
   constexpr std::size_t enough = 5;
   if (count < enough || farthest_m <= outlier_m) return false;
-  const auto middle = heights_m.begin() + static_cast<std::ptrdiff_t>(count / 2);
-  std::nth_element(heights_m.begin(), middle,
-                   heights_m.begin() + static_cast<std::ptrdiff_t>(count));
-  return std::abs(here_m - *middle) > outlier_m;
+  return std::abs(here_m - median_of(std::span(heights_m).first(count))) > outlier_m;
 }
 
 GroundGrid without_outliers(const GroundGrid& ground) {

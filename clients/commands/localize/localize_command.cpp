@@ -18,6 +18,7 @@
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/dataset/dataset_error.hpp"
+#include "core/lidar/ranked_value.hpp"
 #include "core/lidar/rings.hpp"
 #include "core/localization/localizer.hpp"
 #include "core/localization/lone_scan.hpp"
@@ -182,9 +183,7 @@ Json to_json(const LocalizedScan& scan) {
 double median_ms(const std::vector<LocalizedScan>& scans) {
   std::vector<double> times;
   for (const LocalizedScan& scan : scans) times.push_back(scan.ms);
-  const auto middle = times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2);
-  std::nth_element(times.begin(), middle, times.end());
-  return times.empty() ? 0.0 : *middle;
+  return times.empty() ? 0.0 : median_of(times);
 }
 
 Json to_json(const std::vector<LocalizedScan>& scans, std::size_t skipped,

@@ -19,6 +19,7 @@
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/lidar/range_image.hpp"
+#include "core/lidar/ranked_value.hpp"
 #include "core/lidar/scan.hpp"
 #include "core/segmentation/int8_calibration.hpp"
 #include "core/segmentation/model_description.hpp"
@@ -79,9 +80,7 @@ double median_ms(const std::function<void()>& work) {
     times.push_back(ms_of(work));
     total += times.back();
   }
-  const auto middle = times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2);
-  std::ranges::nth_element(times, middle);
-  return *middle;
+  return median_of(times);
 }
 
 /// Speed of a large matrix product on this machine [10^9 operations a second].

@@ -15,6 +15,8 @@
 #include <string>
 #include <thread>
 
+#include "core/lidar/ranked_value.hpp"
+
 namespace stillmap::cli {
 namespace {
 
@@ -152,10 +154,7 @@ std::vector<SpeedBesideLoad> measure_beside_load(Segmenter& segmenter, const Sca
                                 scans_of_share(settings[1].speed, threads));
   std::vector<SpeedBesideLoad> speeds;
   for (Setting& setting : settings) {
-    const auto middle =
-        setting.times_ms.begin() + static_cast<std::ptrdiff_t>(setting.times_ms.size() / 2);
-    std::ranges::nth_element(setting.times_ms, middle);
-    setting.speed.scan_ms = *middle;
+    setting.speed.scan_ms = median_of(setting.times_ms);
     setting.speed.of_fair_share = scans_of_share(setting.speed, threads) / alone;
     speeds.push_back(setting.speed);
   }
