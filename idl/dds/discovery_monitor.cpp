@@ -3,13 +3,12 @@
 #include <fastdds/rtps/participant/ParticipantDiscoveryInfo.h>
 #include <fastdds/rtps/reader/ReaderDiscoveryInfo.h>
 #include <fastdds/rtps/writer/WriterDiscoveryInfo.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <sstream>
 
+#include "core/process/host_name.hpp"
 #include "idl/dds/shown_text.hpp"
 
 namespace stillmap::dds {
@@ -66,12 +65,6 @@ void add_locators(const RemoteLocatorList& locators, RemoteParticipant& peer) {
       peer.addresses.push_back(address);
     }
   }
-}
-
-std::string host_name() {
-  std::array<char, 256> name{};
-  ::gethostname(name.data(), name.size() - 1);
-  return name.data();
 }
 
 // Fast DDS writes a number of the machine into every guid, but not into that of a secured

@@ -4,9 +4,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
+#include "core/process/host_name.hpp"
 #include "idl/conversions/status.hpp"
 #include "idl/dds/transports.hpp"
 #include "idl/interface/participant_diagnostics.hpp"
@@ -19,12 +19,6 @@ constexpr std::chrono::duration<double> poll_period{0.1};
 
 void log(const dds::Diagnostic& diagnostic) {
   spdlog::warn("{}: {}; {}", diagnostic.what, diagnostic.evidence, diagnostic.hint);
-}
-
-std::string host_name() {
-  std::array<char, 256> name{};
-  ::gethostname(name.data(), name.size() - 1);
-  return name.data();
 }
 
 /// How segmentation is reduced because the machine is too slow; empty when it is not.

@@ -14,17 +14,12 @@
 #include <string>
 
 #include "core/map/storage/map_database.hpp"
+#include "core/process/host_name.hpp"
 
 namespace stillmap {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string host_name() {
-  std::array<char, 256> name{};
-  ::gethostname(name.data(), name.size() - 1);
-  return name.data();
-}
 
 /// Of a host name, a process and a token at most; a larger file of that name is no lock.
 constexpr off_t max_lock_bytes = 511;
