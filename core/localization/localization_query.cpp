@@ -2,22 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <span>
 #include <utility>
 
 #include "core/frames/rigid_motion.hpp"
+#include "core/lidar/direction_cells.hpp"
 #include "core/lidar/level_plane.hpp"
 #include "core/odometry/features.hpp"
 
 namespace stillmap {
 namespace {
-
-/// Cells of this size, all round and from straight down to straight up.
-constexpr float cells_per_rad = static_cast<float>(360.0 / std::numbers::pi);
-constexpr int columns = 720;
-constexpr int rows = 361;
 
 /// Ground that a lidar stands on is no steeper than this to it, and so far below [m].
 constexpr double max_slope = 0.4;
@@ -28,23 +23,6 @@ constexpr double max_lidar_height_m = 6.0;
 constexpr float max_ground_range_m = 25.0F;
 /// What stands up is taken as near as this [m].
 constexpr float max_landmark_range_m = 45.0F;
-
-struct Direction {
-  int column = 0;
-  int row = 0;
-};
-
-Direction direction_of(const Eigen::Vector3f& p) {
-  const float azimuth = std::atan2(p.y(), p.x());
-  const float elevation = std::atan2(p.z(), p.head<2>().norm());
-  return {static_cast<int>(std::lround(azimuth * cells_per_rad)),
-          static_cast<int>(std::lround(elevation * cells_per_rad)) + rows / 2};
-}
-
-std::size_t cell_of(int column, int row) {
-  const int wrapped = ((column % columns) + columns) % columns;
-  return static_cast<std::size_t>(std::clamp(row, 0, rows - 1) * columns + wrapped);
-}
 
 Scan turned(const Scan& scan, const Eigen::Matrix3d& R) {
   Scan turned = scan;
@@ -87,29 +65,24 @@ Eigen::Isometry3d foot_of(const LevelPlane& ground_upright) {
 }  // namespace
 
 DirectionRanges::DirectionRanges(const std::vector<Eigen::Vector3f>& points_lidar)
-    : cells_(std::size_t{columns} * rows) {
+    : cells_(DirectionCell::count) {
   for (const Eigen::Vector3f& p : points_lidar) {
-    const Direction direction = direction_of(p);
-    Ranges& ranges = cells_[cell_of(direction.column, direction.row)];
+    Ranges& ranges = cells_[DirectionCell::of(p).index()];
     const float range = p.norm();
     ranges.nearest = ranges.nearest == 0.0F ? range : std::min(ranges.nearest, range);
     ranges.farthest = std::max(ranges.farthest, range);
   }
 }
 
-const DirectionRanges::Ranges& DirectionRanges::at(int column, int row) const {
-  return cells_[cell_of(column, row)];
-}
-
 DirectionRanges::Sight DirectionRanges::look_at(const Eigen::Vector3f& p_lidar) const {
   const float range = p_lidar.norm();
   const float margin = 0.5F + 0.02F * range;
-  const Direction direction = direction_of(p_lidar);
-  bool is_seen = at(direction.column, direction.row).farthest > 0.0F;
+  const DirectionCell direction = DirectionCell::of(p_lidar);
+  bool is_seen = cells_[direction.index()].farthest > 0.0F;
   bool is_beyond_all = is_seen;
   for (int row = direction.row - 1; row <= direction.row + 1; ++row) {
     for (int column = direction.column - 1; column <= direction.column + 1; ++column) {
-      const Ranges& ranges = at(column, row);
+      const Ranges& ranges = cells_[DirectionCell{column, row}.index()];
       if (ranges.farthest == 0.0F) continue;
       if (ranges.nearest < range + margin && ranges.farthest > range - margin) return Sight::hit;
       is_beyond_all &= ranges.nearest > range + margin;

@@ -31,7 +31,6 @@ class DirectionRanges {
     float nearest = 0.0F;
     float farthest = 0.0F;
   };
-  [[nodiscard]] const Ranges& at(int column, int row) const;
 
   std::vector<Ranges> cells_;
 };

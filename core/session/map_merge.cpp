@@ -8,10 +8,10 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <optional>
 #include <utility>
 
+#include "core/lidar/direction_cells.hpp"
 #include "core/lidar/voxel_index.hpp"
 #include "core/map/voxel_grid.hpp"
 
@@ -25,47 +25,32 @@ constexpr double view_height_m = 1.0;
 /// Views are so far apart along the path.
 constexpr double view_spacing_m = 1.0;
 
-/// How far off what is seen in each direction is, in cells of half a degree.
+/// How far off what is seen in each direction is.
 class DepthImage {
  public:
-  DepthImage() : depth_m_(columns * rows, std::numeric_limits<float>::infinity()) {}
+  DepthImage() : depth_m_(DirectionCell::count, std::numeric_limits<float>::infinity()) {}
 
   /// Hides what is behind a voxel of this size.
   void add(const Eigen::Vector3f& p_lidar, float voxel_size_m) {
     constexpr float max_cells = 8.0F;
     const float range = p_lidar.norm();
     const int reach = static_cast<int>(
-        std::lround(std::min(0.5F * voxel_size_m / range * cells_per_rad, max_cells)));
-    const auto [column, row] = cell_of(p_lidar);
+        std::lround(std::min(0.5F * voxel_size_m / range * DirectionCell::per_rad, max_cells)));
+    const auto [column, row] = DirectionCell::of(p_lidar);
     for (int r = row - reach; r <= row + reach; ++r) {
       for (int c = column - reach; c <= column + reach; ++c) {
-        float& depth = depth_m_[index(c, r)];
+        float& depth = depth_m_[DirectionCell{c, r}.index()];
         depth = std::min(depth, range);
       }
     }
   }
   [[nodiscard]] bool shows(const Eigen::Vector3f& p_lidar) const {
-    const auto [column, row] = cell_of(p_lidar);
     const float range = p_lidar.norm();
     // Beside a voxel of the ground lies more of it.
-    return range < depth_m_[index(column, row)] + 0.5F + 0.08F * range;
+    return range < depth_m_[DirectionCell::of(p_lidar).index()] + 0.5F + 0.08F * range;
   }
 
  private:
-  static constexpr int columns = 720;
-  static constexpr int rows = 361;
-  static constexpr float cells_per_rad = static_cast<float>(360.0 / std::numbers::pi);
-
-  static std::pair<int, int> cell_of(const Eigen::Vector3f& p) {
-    return {static_cast<int>(std::lround(std::atan2(p.y(), p.x()) * cells_per_rad)),
-            static_cast<int>(std::lround(std::atan2(p.z(), p.head<2>().norm()) * cells_per_rad)) +
-                rows / 2};
-  }
-  static std::size_t index(int column, int row) {
-    const int wrapped = ((column % columns) + columns) % columns;
-    return static_cast<std::size_t>(std::clamp(row, 0, rows - 1) * columns + wrapped);
-  }
-
   std::vector<float> depth_m_;
 };
 
