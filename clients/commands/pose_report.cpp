@@ -1,5 +1,6 @@
 #include "clients/commands/pose_report.hpp"
 
+#include <cmath>
 #include <numbers>
 
 #include "core/frames/rigid_motion.hpp"
@@ -8,6 +9,10 @@ namespace stillmap::cli {
 
 double heading_deg(const Eigen::Isometry3d& T_parent_child) {
   return heading_rad(T_parent_child) * 180.0 / std::numbers::pi;
+}
+
+double heading_deg(const PlanarPose& pose) {
+  return std::remainder(pose.heading_rad, 2.0 * std::numbers::pi) * 180.0 / std::numbers::pi;
 }
 
 Json rows_json(const Eigen::Isometry3d& T) {

@@ -2,9 +2,9 @@
 
 #include <cmath>
 #include <fstream>
-#include <numbers>
 #include <stdexcept>
 
+#include "clients/commands/pose_report.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/process/file_beside.hpp"
@@ -12,15 +12,11 @@
 namespace stillmap::cli {
 namespace {
 
-double heading_deg(const PlannedPose& pose) {
-  return std::remainder(pose.pose.heading_rad, 2.0 * std::numbers::pi) * 180.0 / std::numbers::pi;
-}
-
 Json pose_json(const PlannedPose& pose) {
   return {{"x_m", pose.pose.position_map.x()},
           {"y_m", pose.pose.position_map.y()},
           {"z_m", pose.height_m},
-          {"heading_deg", heading_deg(pose)},
+          {"heading_deg", heading_deg(pose.pose)},
           {"along_m", pose.along_m},
           {"reverse", pose.is_reverse}};
 }
@@ -40,8 +36,8 @@ std::string pose_table(const PathPlan& plan) {
     if (pose.along_m < next_m && &pose != &plan.poses.back()) continue;
     next_m = pose.along_m + spacing_m;
     table.add({fixed(pose.along_m, 1), fixed(pose.pose.position_map.x(), 2),
-               fixed(pose.pose.position_map.y(), 2), height(pose, 2), fixed(heading_deg(pose), 0),
-               pose.is_reverse ? "reverse" : "forward"});
+               fixed(pose.pose.position_map.y(), 2), height(pose, 2),
+               fixed(heading_deg(pose.pose), 0), pose.is_reverse ? "reverse" : "forward"});
   }
   return table.text();
 }
@@ -64,7 +60,7 @@ void write_csv(std::ostream& out, const PathPlan& plan) {
   out << "x_m,y_m,z_m,heading_deg,along_m,reverse\n";
   for (const PlannedPose& pose : plan.poses) {
     out << fixed(pose.pose.position_map.x(), 3) << ',' << fixed(pose.pose.position_map.y(), 3)
-        << ',' << height(pose, 3) << ',' << fixed(heading_deg(pose), 2) << ','
+        << ',' << height(pose, 3) << ',' << fixed(heading_deg(pose.pose), 2) << ','
         << fixed(pose.along_m, 3) << ',' << (pose.is_reverse ? 1 : 0) << '\n';
   }
 }

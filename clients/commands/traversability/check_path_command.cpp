@@ -1,10 +1,9 @@
-#include <cmath>
 #include <iostream>
 #include <memory>
-#include <numbers>
 #include <stdexcept>
 
 #include "clients/commands/command.hpp"
+#include "clients/commands/pose_report.hpp"
 #include "clients/commands/query/region_arguments.hpp"
 #include "clients/commands/traversability/traversability_source.hpp"
 #include "clients/terminal/json.hpp"
@@ -20,11 +19,6 @@ std::string at(const Eigen::Vector2d& position_map) {
       .append(", ")
       .append(fixed(position_map.y(), 2))
       .append(")");
-}
-
-/// As 'stillmap plan' has headings: -180 to 180.
-double heading_deg(const PlanarPose& pose) {
-  return std::remainder(pose.heading_rad, 2.0 * std::numbers::pi) * 180.0 / std::numbers::pi;
 }
 
 Json conflict_json(const PathConflict& conflict) {
