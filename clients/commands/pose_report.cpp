@@ -4,15 +4,16 @@
 #include <numbers>
 
 #include "core/frames/rigid_motion.hpp"
+#include "core/lidar/angle_units.hpp"
 
 namespace stillmap::cli {
 
 double heading_deg(const Eigen::Isometry3d& T_parent_child) {
-  return heading_rad(T_parent_child) * 180.0 / std::numbers::pi;
+  return heading_rad(T_parent_child) * deg_per_rad;
 }
 
 double heading_deg(const PlanarPose& pose) {
-  return std::remainder(pose.heading_rad, 2.0 * std::numbers::pi) * 180.0 / std::numbers::pi;
+  return std::remainder(pose.heading_rad, 2.0 * std::numbers::pi) * deg_per_rad;
 }
 
 Json rows_json(const Eigen::Isometry3d& T) {

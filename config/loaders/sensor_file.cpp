@@ -6,13 +6,13 @@
 #include <cassert>
 #include <fstream>
 #include <map>
-#include <numbers>
 #include <stdexcept>
 #include <vector>
 
 #include "config/loaders/closest_name.hpp"
 #include "config/loaders/named_file.hpp"
 #include "config/loaders/yaml_section.hpp"
+#include "core/lidar/angle_units.hpp"
 
 namespace stillmap {
 namespace {
@@ -98,17 +98,17 @@ void read_sensor(YamlSection& file, SensorModel& sensor) {
 }  // namespace
 
 void save_sensor(const SensorModel& sensor, const fs::path& file) {
-  constexpr double degree = std::numbers::pi / 180.0;
   YAML::Emitter yaml;
   yaml << YAML::BeginMap << YAML::Key << "name" << YAML::Value << sensor.name;
   yaml << YAML::Key << "pattern" << YAML::Value << name_of(sensor.pattern, scan_patterns());
   yaml << YAML::Key << "rings" << YAML::Value << sensor.rings;
-  yaml << YAML::Key << "fov_up_deg" << YAML::Value << sensor.fov_up / degree;
-  yaml << YAML::Key << "fov_down_deg" << YAML::Value << sensor.fov_down / degree;
+  yaml << YAML::Key << "fov_up_deg" << YAML::Value << sensor.fov_up / rad_per_deg;
+  yaml << YAML::Key << "fov_down_deg" << YAML::Value << sensor.fov_down / rad_per_deg;
   yaml << YAML::Key << "beam_elevations_deg" << YAML::Value << YAML::Flow << YAML::BeginSeq;
-  for (const double elevation : sensor.beam_elevations) yaml << elevation / degree;
+  for (const double elevation : sensor.beam_elevations) yaml << elevation / rad_per_deg;
   yaml << YAML::EndSeq;
-  yaml << YAML::Key << "elevation_offset_deg" << YAML::Value << sensor.elevation_offset / degree;
+  yaml << YAML::Key << "elevation_offset_deg" << YAML::Value
+       << sensor.elevation_offset / rad_per_deg;
   yaml << YAML::Key << "columns" << YAML::Value << sensor.columns;
   yaml << YAML::Key << "min_range_m" << YAML::Value << sensor.min_range_m;
   yaml << YAML::Key << "max_range_m" << YAML::Value << sensor.max_range_m;
@@ -116,7 +116,8 @@ void save_sensor(const SensorModel& sensor, const fs::path& file) {
   yaml << YAML::Key << "ring_source" << YAML::Value << name_of(sensor.ring_source, ring_sources());
   yaml << YAML::Key << "intensity_scale" << YAML::Value << sensor.intensity_scale;
   if (sensor.imu) {
-    const Eigen::Vector3d yaw_pitch_roll = sensor.imu->R_lidar_imu.eulerAngles(2, 1, 0) / degree;
+    const Eigen::Vector3d yaw_pitch_roll =
+        sensor.imu->R_lidar_imu.eulerAngles(2, 1, 0) / rad_per_deg;
     yaml << YAML::Key << "imu" << YAML::Value << YAML::BeginMap;
     yaml << YAML::Key << "roll_pitch_yaw_deg" << YAML::Value << YAML::Flow << YAML::BeginSeq
          << yaw_pitch_roll[2] << yaw_pitch_roll[1] << yaw_pitch_roll[0] << YAML::EndSeq;
@@ -127,8 +128,8 @@ void save_sensor(const SensorModel& sensor, const fs::path& file) {
   yaml << YAML::Key << "motion_limits" << YAML::Value << YAML::BeginMap;
   yaml << YAML::Key << "max_speed_m_s" << YAML::Value << limits.max_speed_m_s;
   yaml << YAML::Key << "max_acceleration_m_s2" << YAML::Value << limits.max_acceleration_m_s2;
-  yaml << YAML::Key << "max_turn_rate_deg_s" << YAML::Value << limits.max_turn_rate_rad_s / degree
-       << YAML::EndMap;
+  yaml << YAML::Key << "max_turn_rate_deg_s" << YAML::Value
+       << limits.max_turn_rate_rad_s / rad_per_deg << YAML::EndMap;
   yaml << YAML::EndMap;
   std::ofstream out(file);
   out << yaml.c_str() << '\n';

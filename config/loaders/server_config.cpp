@@ -6,7 +6,6 @@
 #include <cctype>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -20,6 +19,7 @@
 #include "config/loaders/yaml_section.hpp"
 #include "core/frames/rigid_motion.hpp"
 #include "core/geodesy/datum.hpp"
+#include "core/lidar/angle_units.hpp"
 #include "core/lidar/sweep_merger.hpp"
 #include "core/segmentation/model_description.hpp"
 
@@ -122,11 +122,10 @@ Eigen::Vector3d read_triple(YamlSection& section, const std::string& name,
 }
 
 Eigen::Isometry3d read_extrinsic(YamlSection& section) {
-  constexpr double radians_per_degree = std::numbers::pi / 180.0;
   const Eigen::Vector3d none(0.0, 0.0, 0.0);
   const Eigen::Vector3d xyz_m = read_triple(section, "xyz_m", none, {-100, 100});
   const Eigen::Vector3d rpy_deg = read_triple(section, "rpy_deg", none, {-360, 360});
-  return from_xyz_rpy(xyz_m, rpy_deg * radians_per_degree);
+  return from_xyz_rpy(xyz_m, rpy_deg * rad_per_deg);
 }
 
 void read_gnss(YamlSection section, GnssReceiverConfig& gnss) {

@@ -5,17 +5,15 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <numbers>
 #include <set>
 #include <sstream>
 #include <string_view>
 
 #include "config/loaders/closest_name.hpp"
+#include "core/lidar/angle_units.hpp"
 
 namespace stillmap {
 namespace {
-
-constexpr double radians_per_degree = std::numbers::pi / 180.0;
 
 /// Fields that had another name in the same section, by their path in the file.
 struct RenamedField {
@@ -223,17 +221,17 @@ void YamlSection::degrees(const std::string& name, double& radians, Range allowe
   const std::optional<double> value_deg = read_number(name, allowed_deg);
   if (!value_deg) return;
   // The way through degrees costs the last digit; that is no change.
-  const double read = *value_deg * radians_per_degree;
+  const double read = *value_deg * rad_per_deg;
   assign(name, radians, near(read, radians) ? radians : read);
 }
 
 void YamlSection::degrees_list(const std::string& name, std::vector<double>& radians,
                                Range allowed_deg) {
   std::vector<double> read = radians;
-  for (double& value : read) value /= radians_per_degree;
+  for (double& value : read) value /= rad_per_deg;
   const std::size_t changes = file_.report.changed.size();
   number_list(name, read, allowed_deg);
-  for (double& value : read) value *= radians_per_degree;
+  for (double& value : read) value *= rad_per_deg;
   if (std::ranges::equal(read, radians, near)) file_.report.changed.resize(changes);
   radians = std::move(read);
 }

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <vector>
 
+#include "core/lidar/angle_units.hpp"
 #include "core/lidar/measured_elevation.hpp"
 #include "core/lidar/prepare.hpp"
 #include "core/lidar/ranked_value.hpp"
@@ -16,8 +17,7 @@
 namespace stillmap {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180.0;
-constexpr double elevation_offset = 0.205 * degree;
+constexpr double elevation_offset = 0.205 * rad_per_deg;
 constexpr std::size_t rings_of_block = 32;
 
 /// How far the median elevations of the rings lie above the straight line through their block of
@@ -32,11 +32,11 @@ constexpr std::array<double, 2 * rings_of_block> beam_unevenness_deg{
 constexpr double min_correlation = 0.6;
 /// Mean elevation of the lower block [rad]: -15.85 to -15.99 degrees in most of 108 scans of all
 /// days of these recordings, 0.205 higher where somebody turned them up before.
-constexpr double min_corrected_elevation = -15.82 * degree;
+constexpr double min_corrected_elevation = -15.82 * rad_per_deg;
 /// Larger steps are those to the next ring.
-constexpr double max_step = 10.0 * degree;
+constexpr double max_step = 10.0 * rad_per_deg;
 /// Simulated lidars turn more evenly than this; KITTI's deviates by 0.09 degrees and more.
-constexpr double min_real_step = 0.02 * degree;
+constexpr double min_real_step = 0.02 * rad_per_deg;
 /// Raw scans show up to 0.014 m, compensated ones 0.07 m at 3 km/h.
 constexpr double max_uncompensated_m = 0.04;
 

@@ -2,13 +2,13 @@
 
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <utility>
+
+#include "core/lidar/angle_units.hpp"
 
 namespace stillmap {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180.0;
 constexpr std::size_t blocks = 12;
 constexpr std::size_t block_bytes = 100;
 constexpr std::size_t channels = 32;
@@ -166,7 +166,7 @@ class Decoder {
       const std::size_t laser = channel % model_->lasers;
       const double fired_us = static_cast<double>(channel / model_->lasers) * model_->firing_us +
                               static_cast<double>(laser) * model_->laser_us;
-      const double angle = 0.01 * degree * (azimuth + step * fired_us / model_->block_us);
+      const double angle = 0.01 * rad_per_deg * (azimuth + step * fired_us / model_->block_us);
       add_point(laser, metres_per_count * count, angle, bytes[value_at + 2]);
       decoding_.scan.time_offset_s.push_back(
           static_cast<float>(packet_s + 1e-6 * (begin_us + fired_us)));

@@ -5,10 +5,11 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
-#include <numbers>
 #include <numeric>
 #include <stdexcept>
 #include <string>
+
+#include "core/lidar/angle_units.hpp"
 
 namespace stillmap::evaluation {
 namespace {
@@ -175,7 +176,6 @@ namespace {
 
 constexpr std::array segment_lengths_m{100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0};
 constexpr std::size_t poses_between_segments = 10;
-constexpr double deg_per_rad = 180.0 / std::numbers::pi;
 
 // The true motion from pose `first` to pose `last` relative to the estimated one.
 Eigen::Isometry3d motion_error(const PosePairs& pairs, std::size_t first, std::size_t last) {

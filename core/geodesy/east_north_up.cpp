@@ -4,15 +4,11 @@
 #include <GeographicLib/LocalCartesian.hpp>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
+#include "core/lidar/angle_units.hpp"
+
 namespace stillmap {
-namespace {
-
-constexpr double degrees = 180.0 / std::numbers::pi;
-
-}  // namespace
 
 Eigen::Vector3d EastNorthUp::position_enu(const GnssFix& fix) const {
   const GeographicLib::LocalCartesian local(latitude_deg_, longitude_deg_, altitude_m_);
@@ -37,7 +33,7 @@ Datum EastNorthUp::datum_of(const Eigen::Isometry3d& T_enu_map) const {
   const EastNorthUp at_map(origin.latitude_deg, origin.longitude_deg, origin.altitude_m);
   const Eigen::Vector3d along_x =
       at_map.position_enu(fix_at(T_enu_map * Eigen::Vector3d::UnitX().eval()));
-  const double azimuth_deg = std::atan2(along_x.x(), along_x.y()) * degrees;
+  const double azimuth_deg = std::atan2(along_x.x(), along_x.y()) * deg_per_rad;
   return {.latitude_deg = origin.latitude_deg,
           .longitude_deg = origin.longitude_deg,
           .altitude_m = origin.altitude_m,

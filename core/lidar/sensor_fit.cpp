@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/lidar/angle_units.hpp"
 #include "core/lidar/measured_elevation.hpp"
 #include "core/lidar/ranked_value.hpp"
 #include "core/lidar/ring_numbering.hpp"
@@ -20,17 +21,16 @@
 namespace stillmap {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180.0;
 constexpr std::size_t min_points = 1000;
 constexpr std::size_t min_points_on_ring = 10;
 /// Beams of one kind of sensor differ by less from its data sheet, apart from mounting and wear.
-constexpr double max_elevation_difference = 0.5 * degree;
+constexpr double max_elevation_difference = 0.5 * rad_per_deg;
 /// Smallest step between the elevations of two rings: beams must descend strictly.
-constexpr double min_elevation_step = 0.01 * degree;
+constexpr double min_elevation_step = 0.01 * rad_per_deg;
 /// Bands that the field of view of a sensor without rings is divided into: 1 to 2 degrees each.
 constexpr int bands = 40;
 /// A sensor's points lie inside its field of view but for noise and mounting.
-constexpr double margin = 1.0 * degree;
+constexpr double margin = 1.0 * rad_per_deg;
 constexpr std::size_t max_samples = 8192;
 
 /// Elevations of the measured points of every ring, in the field's own order. Empty for a field of
@@ -52,7 +52,7 @@ std::vector<std::vector<double>> elevations_by_ring(const Scan& scan) {
 /// Rings of one that leans, or whose cloud is in the robot's frame, bend smoothly; motion within a
 /// scan, taken out or not, moves most points by less than a few degrees.
 bool are_scattered(const Scan& scan, const std::vector<double>& medians) {
-  constexpr double max_distance = 3.0 * degree;
+  constexpr double max_distance = 3.0 * rad_per_deg;
   constexpr std::size_t sectors = 12;
   const auto [low, high] = std::ranges::minmax(medians);
   const double step = (high - low) / static_cast<double>(medians.size() - 1);
@@ -176,7 +176,7 @@ std::vector<Cluster> elevation_clusters(const Scan& scan, double& points) {
   // Beams start a centimetre beside the origin, which is half a degree here; farther away a lidar
   // low on a robot sees nothing of its lower rings.
   constexpr float min_range_m = 1.0F;
-  constexpr double bin = 0.02 * degree;
+  constexpr double bin = 0.02 * rad_per_deg;
   constexpr std::size_t bins_half = 4500;
   constexpr std::size_t empty_between = 2;
   std::vector<Cluster> histogram(2 * bins_half + 1);
@@ -261,7 +261,7 @@ std::optional<SensorModel> fit_shown_rings(std::vector<double> elevations) {
 /// Whether a scan with these highest and lowest elevations may be an HDL-64E's, whose beams differ
 /// by half a degree from car to car, and in a compensated scan by more.
 bool is_field_of_hdl_64e(double high, double low) {
-  return high < 5.0 * degree && low < -20.0 * degree && low > -27.0 * degree;
+  return high < 5.0 * rad_per_deg && low < -20.0 * rad_per_deg && low > -27.0 * rad_per_deg;
 }
 
 /// Median elevation of each turn, and the share of points that lie nearer to it than half way to
@@ -349,12 +349,12 @@ std::optional<SensorModel> fit_bands(const Scan& scan) {
   const std::vector<double> elevations = sorted_elevations(scan);
   if (elevations.size() < min_points / 2) return std::nullopt;
   const auto [low, high] = edges_of(elevations);
-  if (std::abs(high - 15.0 * degree) < max_elevation_difference &&
-      std::abs(low + 15.0 * degree) < max_elevation_difference) {
+  if (std::abs(high - 15.0 * rad_per_deg) < max_elevation_difference &&
+      std::abs(low + 15.0 * rad_per_deg) < max_elevation_difference) {
     return vlp_16();
   }
   if (is_field_of_hdl_64e(high, low)) return hdl_64e();
-  if (high - low < 1.0 * degree) return std::nullopt;
+  if (high - low < 1.0 * rad_per_deg) return std::nullopt;
   SensorModel sensor;
   sensor.name = "lidar without rings";
   sensor.pattern = ScanPattern::irregular;
@@ -366,7 +366,7 @@ std::optional<SensorModel> fit_bands(const Scan& scan) {
 }
 
 std::string in_degrees(double angle) {
-  return std::to_string(static_cast<int>(std::lround(angle / degree)));
+  return std::to_string(static_cast<int>(std::lround(angle / rad_per_deg)));
 }
 
 }  // namespace
@@ -408,8 +408,8 @@ std::string in_words(const SensorModel& sensor) {
   text << sensor.name << ": "
        << (sensor.pattern != ScanPattern::rings ? "points anywhere"
                                                 : std::to_string(sensor.rings) + " rings")
-       << std::fixed << std::setprecision(2) << " from " << sensor.fov_up / degree << " to "
-       << sensor.fov_down / degree << " degrees of elevation";
+       << std::fixed << std::setprecision(2) << " from " << sensor.fov_up / rad_per_deg << " to "
+       << sensor.fov_down / rad_per_deg << " degrees of elevation";
   return text.str();
 }
 

@@ -12,12 +12,11 @@
 #include <numbers>
 #include <vector>
 
+#include "core/lidar/angle_units.hpp"
 #include "core/lidar/level_plane.hpp"
 
 namespace stillmap {
 namespace {
-
-constexpr double degree_rad = std::numbers::pi / 180.0;
 
 constexpr float reach_m = 20.0F;
 /// The robot itself.
@@ -90,7 +89,7 @@ double angle_between(const LevelPlane& a, const LevelPlane& b) {
   return std::acos(std::clamp(normal_of(a).dot(normal_of(b)), -1.0, 1.0));
 }
 
-constexpr double max_angle = 2.5 * degree_rad;
+constexpr double max_angle = 2.5 * rad_per_deg;
 
 /// Whether what lies near the plane up its slope, and what lies down it, are parts of it.
 bool is_plane_in_both_halves(const LevelPlane& plane, std::span<const Eigen::Vector3f> lowest) {
@@ -272,7 +271,7 @@ bool is_on_lane_in_slope(const LevelPlane& plane, std::span<const Eigen::Vector3
 /// beams start.
 double entropy_of_elevations(std::span<const Eigen::Vector3f> points) {
   constexpr float far_m = 10.0F;
-  constexpr double bin = 0.1 * degree_rad;
+  constexpr double bin = 0.1 * rad_per_deg;
   constexpr std::size_t max_points = 20'000;
   std::array<std::uint32_t, 1801> histogram{};
   std::uint32_t counted = 0;
@@ -281,7 +280,7 @@ double entropy_of_elevations(std::span<const Eigen::Vector3f> points) {
     const Eigen::Vector3f& p = points[i];
     if (!(p.squaredNorm() > far_m * far_m) || !p.allFinite()) continue;
     const double elevation = std::atan2(p.z(), p.head<2>().norm());
-    ++histogram[static_cast<std::size_t>((elevation + 90.0 * degree_rad) / bin)];
+    ++histogram[static_cast<std::size_t>((elevation + 90.0 * rad_per_deg) / bin)];
     ++counted;
   }
   double entropy = 0.0;

@@ -2,14 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "core/lidar/angle_units.hpp"
 
 namespace stillmap {
-namespace {
-
-constexpr double degree = std::numbers::pi / 180.0;
-
-}  // namespace
 
 LidarTilt::LidarTilt(const Eigen::Matrix3d& R_base_lidar)
     : R_base_lidar_(R_base_lidar),
@@ -26,7 +22,7 @@ std::vector<Eigen::Vector3f> LidarTilt::turned(
 
 bool LidarTilt::turns_image() const {
   // At 7 degrees both kinds find as much, at 15 the turned ones more.
-  constexpr double max_tilt_of_own_image = 8.0 * degree;
+  constexpr double max_tilt_of_own_image = 8.0 * rad_per_deg;
   return tilt_rad_ > max_tilt_of_own_image;
 }
 
@@ -35,7 +31,7 @@ ProjectionModel LidarTilt::widened(ProjectionModel upright) const {
   double highest = -1.0, lowest = 1.0;
   for (const double elevation : {upright.fov_up, upright.fov_down}) {
     for (int azimuth = 0; azimuth < 360; ++azimuth) {
-      const double a = azimuth * degree;
+      const double a = azimuth * rad_per_deg;
       const double up = R_base_lidar_.row(2).dot(
           Eigen::RowVector3d(std::cos(elevation) * std::cos(a), std::cos(elevation) * std::sin(a),
                              std::sin(elevation)));

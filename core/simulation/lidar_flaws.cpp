@@ -5,10 +5,10 @@
 #include <numbers>
 #include <sstream>
 
+#include "core/lidar/angle_units.hpp"
+
 namespace stillmap::simulation {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 // The HDL-64E has two laser blocks above its origin; the beams of smaller sensors share one origin.
 double block_height(std::size_t ring, std::size_t rings, double upper_m, double lower_m) {
@@ -19,7 +19,7 @@ std::vector<BeamFlaw> random_beams(const SensorModel& sensor, Random& random) {
   const auto rings = static_cast<std::size_t>(sensor.rings);
   const bool two_blocks = sensor.rings > 32 && !sensor.beam_elevations.empty();
   const double error =
-      (two_blocks ? random.uniform(0.04, 0.1) : random.uniform(0.0, 0.06)) * degree;
+      (two_blocks ? random.uniform(0.04, 0.1) : random.uniform(0.0, 0.06)) * rad_per_deg;
   const double spread = random.uniform(0.0, random.chance(0.6) ? 0.12 : 0.3);
   const double upper_m = two_blocks ? random.uniform(0.05, 0.17) : 0.0;
   const double lower_m = two_blocks ? random.uniform(0.02, 0.14) : 0.0;
@@ -93,8 +93,8 @@ LidarFlaws random_flaws(const SensorModel& sensor, Random random) {
   LidarFlaws flaws;
   flaws.beams = random_beams(sensor, random);
   flaws.blind_spots = random_blind_spots(sensor, random);
-  flaws.roll = 0.7 * degree * random.normal();
-  flaws.pitch = 0.7 * degree * random.normal();
+  flaws.roll = 0.7 * rad_per_deg * random.normal();
+  flaws.pitch = 0.7 * rad_per_deg * random.normal();
   // Sensors compress or stretch contrast; a surface of 0.25 is reported as 0.12 to 0.5. A HDL-64E
   // as KITTI has it shows ground and walls nearly alike, and what is dark as 0.
   const bool equalised = random.chance(0.7);

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/lidar/angle_units.hpp"
 #include "core/lidar/prepare.hpp"
 #include "core/simulation/city.hpp"
 #include "core/simulation/random.hpp"
@@ -17,8 +18,6 @@
 
 namespace stillmap::simulation {
 namespace {
-
-constexpr double deg = std::numbers::pi / 180.0;
 
 /// Time since the start of a motion at rate 1 that ramps up and down within `ramp_s`, and so ends
 /// `duration_s + ramp_s` after its start having advanced by `duration_s`.
@@ -32,8 +31,8 @@ double ramped(double time_s, double duration_s, double ramp_s) {
 
 /// Quarter turns to one side and the other, with rests of uneven length between them.
 double hard_turn_yaw(double time_s) {
-  constexpr double rate = 55.0 * deg;
-  constexpr double turn_s = 90.0 * deg / rate;
+  constexpr double rate = 55.0 * rad_per_deg;
+  constexpr double turn_s = 90.0 * rad_per_deg / rate;
   constexpr std::array<double, 4> starts_s{2.05, 5.33, 9.71, 13.02};
   constexpr std::array<double, 4> sense{1.0, -1.0, -1.0, 1.0};
   constexpr double cycle_s = 17.0;
@@ -51,9 +50,12 @@ double wave(double time_s, double frequency_hz, double phase) {
 Eigen::Isometry3d handheld_pose(double time_s) {
   // From standing still, so that the first scans are as sharp as those of a person who starts.
   const double begun = std::min(1.0, time_s / 2.0);
-  const double yaw = begun * deg * (22.0 * wave(time_s, 0.31, 0.4) + 6.0 * wave(time_s, 0.9, 1.0));
-  const double pitch = begun * deg * (3.0 * wave(time_s, 1.8, 0.0) + 2.0 * wave(time_s, 0.43, 2.0));
-  const double roll = begun * deg * (2.5 * wave(time_s, 0.9, 0.3) + 2.0 * wave(time_s, 0.27, 1.1));
+  const double yaw =
+      begun * rad_per_deg * (22.0 * wave(time_s, 0.31, 0.4) + 6.0 * wave(time_s, 0.9, 1.0));
+  const double pitch =
+      begun * rad_per_deg * (3.0 * wave(time_s, 1.8, 0.0) + 2.0 * wave(time_s, 0.43, 2.0));
+  const double roll =
+      begun * rad_per_deg * (2.5 * wave(time_s, 0.9, 0.3) + 2.0 * wave(time_s, 0.27, 1.1));
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   T.translation() =
       begun * Eigen::Vector3d(0.02 * wave(time_s, 1.8, 0.5), 0.04 * wave(time_s, 0.9, 0.0),

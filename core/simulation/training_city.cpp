@@ -2,14 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "core/lidar/angle_units.hpp"
 
 namespace stillmap::simulation {
 namespace {
 
 using Eigen::Vector2d;
 
-constexpr double degree = std::numbers::pi / 180.0;
 constexpr double min_spacing_m = 8.0;
 // Long enough for one round of the longest route.
 constexpr int sequence_scans = 900;
@@ -19,8 +19,8 @@ SensorModel random_sensor(Random& random) {
   SensorModel sensor;
   sensor.name = "evenly spaced";
   sensor.rings = random.chance(0.5) ? 64 : 32;
-  sensor.fov_up = random.uniform(2.0, 22.0) * degree;
-  sensor.fov_down = -random.uniform(14.0, 32.0) * degree;
+  sensor.fov_up = random.uniform(2.0, 22.0) * rad_per_deg;
+  sensor.fov_down = -random.uniform(14.0, 32.0) * rad_per_deg;
   return sensor;
 }
 

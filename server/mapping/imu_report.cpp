@@ -4,13 +4,13 @@
 
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <string>
+
+#include "core/lidar/angle_units.hpp"
 
 namespace stillmap::server {
 namespace {
 
-constexpr double deg_per_rad = 180.0 / std::numbers::pi;
 /// A gyro that is the lidar's is believed after a few degrees of turning.
 constexpr double max_unbelieved_turn_rad = 30.0 / deg_per_rad;
 /// So many sweeps without samples in a row from the first on are no late start.

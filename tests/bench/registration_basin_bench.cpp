@@ -14,6 +14,7 @@
 
 #include "clients/terminal/command_line.hpp"
 #include "config/loaders/sensor_file.hpp"
+#include "core/lidar/angle_units.hpp"
 #include "core/mapper.hpp"
 #include "core/segmentation/segmenter.hpp"
 #include "core/simulation/simulation.hpp"
@@ -21,7 +22,6 @@
 namespace stillmap::bench {
 namespace {
 
-constexpr double rad_per_deg = std::numbers::pi / 180.0;
 /// A registration has succeeded within these.
 constexpr double max_error_m = 0.1;
 constexpr double max_error_deg = 0.5;

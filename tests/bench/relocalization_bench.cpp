@@ -6,13 +6,13 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <numbers>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "clients/terminal/command_line.hpp"
+#include "core/lidar/angle_units.hpp"
 #include "core/lidar/prepare.hpp"
 #include "core/localization/localizer.hpp"
 #include "core/map/map_id.hpp"
@@ -25,7 +25,6 @@ namespace stillmap::bench {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr double rad_per_deg = std::numbers::pi / 180.0;
 /// A place is right within these.
 constexpr double max_error_m = 0.5;
 constexpr double max_error_rad = 2.0 * rad_per_deg;

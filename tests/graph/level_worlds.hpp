@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <random>
 #include <utility>
 #include <vector>
 
+#include "core/lidar/angle_units.hpp"
 #include "core/lidar/labelled_scan.hpp"
 #include "tests/lidar/boxes.hpp"
 
@@ -16,7 +16,6 @@
 
 namespace stillmap::levels {
 
-constexpr double rad_per_deg = std::numbers::pi / 180.0;
 constexpr double lidar_height_m = 1.8;
 constexpr double max_range_m = 60.0;
 

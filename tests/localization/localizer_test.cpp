@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/lidar/angle_units.hpp"
 #include "core/lidar/prepare.hpp"
 #include "core/simulation/simulation.hpp"
 #include "tests/localization/yard_map.hpp"
@@ -16,8 +17,6 @@
 
 namespace stillmap::test {
 namespace {
-
-constexpr double rad_per_deg = std::numbers::pi / 180.0;
 
 LocalizationResult localize(const Localizer& localizer, const simulation::SimulatedScan& simulated,
                             bool is_labelled = true) {

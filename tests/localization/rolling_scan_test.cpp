@@ -1,11 +1,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "core/lidar/angle_units.hpp"
 #include "core/lidar/prepare.hpp"
 #include "core/lidar/rings.hpp"
 #include "core/localization/lone_scan.hpp"
@@ -17,7 +17,6 @@
 namespace stillmap::test {
 namespace {
 
-constexpr double deg_per_rad = 180.0 / std::numbers::pi;
 constexpr double yard_period_s = 0.1;
 
 /// Drives in the mapped yard on another day, whose points are measured one after the other: by a

@@ -7,17 +7,15 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <vector>
 
+#include "core/lidar/angle_units.hpp"
 #include "core/segmentation/network_segmenter.hpp"
 #include "tests/segmentation/sample_model.hpp"
 
 namespace stillmap {
 namespace {
-
-constexpr double rad_per_deg = std::numbers::pi / 180.0;
 
 Eigen::Matrix3d leaning(double roll_deg, double pitch_deg) {
   return (Eigen::AngleAxisd(pitch_deg * rad_per_deg, Eigen::Vector3d::UnitY()) *

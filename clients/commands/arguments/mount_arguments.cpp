@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 
 #include "config/loaders/server_config.hpp"
 #include "core/frames/rigid_motion.hpp"
+#include "core/lidar/angle_units.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -30,9 +30,8 @@ std::optional<Eigen::Isometry3d> MountArguments::T_base_lidar() const {
         "--mount needs finite numbers: x,y,z in metres, roll,pitch,yaw in "
         "degrees");
   }
-  constexpr double radians_per_degree = std::numbers::pi / 180.0;
   return from_xyz_rpy({xyz_rpy[0], xyz_rpy[1], xyz_rpy[2]},
-                      radians_per_degree * Eigen::Vector3d(xyz_rpy[3], xyz_rpy[4], xyz_rpy[5]));
+                      rad_per_deg * Eigen::Vector3d(xyz_rpy[3], xyz_rpy[4], xyz_rpy[5]));
 }
 
 MappedBody body_of(const MountArguments& mount, const std::string& file) {

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <iostream>
 #include <memory>
-#include <numbers>
 #include <stdexcept>
 #include <string>
 
@@ -13,12 +12,12 @@
 #include "config/loaders/sensor_file.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "core/elevation_calibration.hpp"
+#include "core/lidar/angle_units.hpp"
 #include "core/lidar/sensor_fit.hpp"
 
 namespace stillmap::cli {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180.0;
 /// Fewer scans show too little of a place from elsewhere.
 constexpr int min_calibration_scans = 20;
 
@@ -55,7 +54,7 @@ void calibrate(const ScanDataset& recording, int max_scans, SensorModel& sensor)
       config);
   Table table({"turned up by [deg]", "occupied voxels"});
   for (const ElevationCalibration::Trial& trial : found.trials)
-    table.add({fixed(trial.offset / degree, 2), std::to_string(trial.voxels)});
+    table.add({fixed(trial.offset / rad_per_deg, 2), std::to_string(trial.voxels)});
   std::cout << table.text();
   if (!found.offset) {
     std::cout << "elevation offset: not to be told from this drive; it needs places that are seen "
@@ -63,8 +62,8 @@ void calibrate(const ScanDataset& recording, int max_scans, SensorModel& sensor)
     return;
   }
   sensor.elevation_offset = *found.offset;
-  std::cout << "elevation offset: " << fixed(*found.offset / degree, 3)
-            << " degrees (1 sigma: " << fixed(found.sigma / degree, 3) << "), which saves "
+  std::cout << "elevation offset: " << fixed(*found.offset / rad_per_deg, 3)
+            << " degrees (1 sigma: " << fixed(found.sigma / rad_per_deg, 3) << "), which saves "
             << fixed(100.0 * found.saving, 2) << " % of the voxels\n";
 }
 

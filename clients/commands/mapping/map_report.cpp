@@ -3,13 +3,13 @@
 #include <sys/resource.h>
 
 #include <fstream>
-#include <numbers>
 #include <utility>
 #include <vector>
 
 #include "clients/commands/pose_report.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/dataset/dataset_error.hpp"
+#include "core/lidar/angle_units.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -102,7 +102,7 @@ Json to_json(const GnssReport& gnss) {
           {"time_offset_s", gnss.delay.delay_s},
           {"antenna_offset_m", {gnss.delay.antenna_lidar.x(), gnss.delay.antenna_lidar.y()}},
           {"datum", gnss.datum ? Json(to_text(*gnss.datum)) : Json(nullptr)},
-          {"tilt_deg", gnss.tilt_rad * 180.0 / std::numbers::pi}};
+          {"tilt_deg", gnss.tilt_rad * deg_per_rad}};
 }
 
 Json to_json(const LoopReport& loops, const std::optional<TrajectoryReport>& odometry) {
@@ -241,7 +241,6 @@ std::string describe_imu(const MappingResult& result) {
                      std::to_string(imu.scans_without_samples) + " and not believed for " +
                      std::to_string(imu.scans_not_believed);
   if (!result.levelling) return text;
-  constexpr double deg_per_rad = 180.0 / std::numbers::pi;
   if (!result.levelling->fault.empty())
     return text + "; it does not level the map: " + result.levelling->fault;
   return text + "; it levels the map, in which the lidar leans by " +

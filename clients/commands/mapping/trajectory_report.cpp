@@ -2,15 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <numbers>
 
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
+#include "core/lidar/angle_units.hpp"
 
 namespace stillmap::cli {
 namespace {
-
-constexpr double deg_per_rad = 180.0 / std::numbers::pi;
 
 void add_absolute(Table& table, const std::string& alignment,
                   const evaluation::AbsoluteTrajectoryError& error) {

@@ -2,7 +2,6 @@
 #include <cmath>
 #include <iostream>
 #include <memory>
-#include <numbers>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -12,11 +11,10 @@
 #include "clients/commands/pose_report.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
+#include "core/lidar/angle_units.hpp"
 
 namespace stillmap::cli {
 namespace {
-
-constexpr double rad_per_deg = std::numbers::pi / 180.0;
 
 struct LocateArguments {
   ClientArguments client;
