@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "core/odometry/registration.hpp"
@@ -14,44 +13,36 @@
 namespace stillmap {
 namespace {
 
-/// Both scans, as a motion between them makes them.
-struct Straightened {
-  LocalMap map;
-  Eigen::Isometry3d T_map_first;
-  OdometryResult second;
-};
-
 /// What a motion between the scans makes of them, where they fit, and how much speaks for it.
 struct Candidate {
-  std::optional<Straightened> scans;
+  std::optional<StraightenedScans> scans;
   double score = 0.0;
 };
 
 /// The scans that are straightened, and how.
 struct TwoScans {
   const FirstScan& first;
-  const FeatureSets& features;
-  double interval_s;
-  const SweepTimes& sweep;
+  const SecondScan& second;
   const OdometryConfig& config;
   const LocalMap& empty_map;
 };
 
 /// From that motion between the scans on; nothing where they do not fit.
-std::optional<Straightened> straightened(const TwoScans& scans, Eigen::Isometry3d T_first_second,
-                                         int rounds) {
-  Straightened result{scans.empty_map, scans.first.T_map_stamp, {}};
-  FeatureSets moving = scans.features;
+std::optional<StraightenedScans> straightened(const TwoScans& scans,
+                                              Eigen::Isometry3d T_first_second, int rounds) {
+  StraightenedScans result{scans.empty_map, scans.first.T_map_stamp, {}};
+  const SecondScan& second = scans.second;
+  FeatureSets moving = second.features;
   for (int round = 0; round < rounds; ++round) {
-    const PoseTangent velocity = twist_of(T_first_second) / scans.interval_s;
+    const PoseTangent velocity = twist_of(T_first_second) / second.interval_s;
     result.T_map_first = scans.first.T_map_stamp * motion_of(velocity * scans.first.sweep.middle_s);
     result.map.clear();
     extend_local_map(result.map, scans.first.features, result.T_map_first,
                      {.twist = velocity * scans.first.sweep.duration_s});
     moving.sweep_prior.T_map_lidar_last = result.T_map_first;
     result.second = register_features(moving, result.map,
-                                      result.T_map_first * motion_of(velocity * scans.interval_s),
-                                      scans.config, {.twist = velocity * scans.sweep.duration_s});
+                                      result.T_map_first * motion_of(velocity * second.interval_s),
+                                      scans.config, {.twist = velocity * second.sweep.duration_s});
     if (result.second.health == OdometryHealth::lost) return std::nullopt;
     T_first_second = result.T_map_first.inverse() * result.second.T_map_lidar;
   }
@@ -86,43 +77,42 @@ bool can_begin_map(const FeatureSets& features, const OdometryConfig& config) {
   return features.edges.size() + features.planes.size() + features.surfaces.size() >= needed;
 }
 
-void straighten_first_scan(const FirstScan& first, const FeatureSets& features, double interval_s,
-                           const SweepTimes& sweep, const OdometryConfig& config,
-                           double max_speed_m_s, LocalMap& map, RegisteredScan& last,
-                           OdometryResult& second) {
+std::optional<StraightenedScans> straighten_first_scan(const FirstScan& first,
+                                                       const SecondScan& second,
+                                                       const BentScans& found,
+                                                       const OdometryConfig& config,
+                                                       double max_speed_m_s) {
   constexpr int first_rounds = 2;
   constexpr int more_rounds = 4;
-  LocalMap empty_map = map;
+  LocalMap empty_map = found.map;
   empty_map.clear();
   // Enough to tell the motions apart: one that is far off would take many steps to nowhere.
   constexpr int rough_iterations = 20;
   OdometryConfig rough = config;
   rough.registration.max_iterations = std::min(rough.registration.max_iterations, rough_iterations);
-  const FeatureSets some = downsampled(features);
-  const TwoScans roughly{first, some, interval_s, sweep, rough, empty_map};
-  const TwoScans scans{first, features, interval_s, sweep, config, empty_map};
-  const std::vector<Eigen::Isometry3d> motions =
-      possible_motions(last.T_map_lidar.inverse() * second.T_map_lidar, interval_s, max_speed_m_s);
+  const FeatureSets some = downsampled(second.features);
+  const SecondScan some_of_second{some, second.sweep, second.interval_s};
+  const TwoScans roughly{first, some_of_second, rough, empty_map};
+  const std::vector<Eigen::Isometry3d> motions = possible_motions(
+      found.T_map_first.inverse() * found.second.T_map_lidar, second.interval_s, max_speed_m_s);
   std::vector<Candidate> candidates(motions.size());
   tbb::parallel_for(std::size_t{0}, motions.size(), [&](std::size_t i) {
     Candidate& candidate = candidates[i];
     candidate.scans = straightened(roughly, motions[i], first_rounds);
     if (candidate.scans)
-      candidate.score =
-          score_of_first_motion(candidate.scans->second, features, candidate.scans->map, config);
+      candidate.score = score_of_first_motion(candidate.scans->second, second.features,
+                                              candidate.scans->map, config);
   });
   Candidate& as_found = candidates.front();
-  if (!as_found.scans) as_found.score = score_of_first_motion(second, features, map, config);
+  if (!as_found.scans)
+    as_found.score = score_of_first_motion(found.second, second.features, found.map, config);
   const Candidate* best = &as_found;
   for (const Candidate& candidate : candidates)
     if (candidate.scans && candidate.score > clearly_better * best->score) best = &candidate;
-  if (!best->scans) return;
-  std::optional<Straightened> result = straightened(
-      scans, best->scans->T_map_first.inverse() * best->scans->second.T_map_lidar, more_rounds);
-  if (!result) return;
-  map = std::move(result->map);
-  last.T_map_lidar = result->T_map_first;
-  second = result->second;
+  if (!best->scans) return std::nullopt;
+  return straightened({first, second, config, empty_map},
+                      best->scans->T_map_first.inverse() * best->scans->second.T_map_lidar,
+                      more_rounds);
 }
 
 }  // namespace stillmap

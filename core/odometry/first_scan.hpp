@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "core/lidar/prepare.hpp"
 #include "core/odometry/pose_search.hpp"
 
@@ -15,14 +17,38 @@ struct FirstScan {
 /// Whether a scan shows enough that the next one can be registered to it.
 [[nodiscard]] bool can_begin_map(const FeatureSets& features, const OdometryConfig& config);
 
+/// The scan after it.
+struct SecondScan {
+  /// Not compensated for motion.
+  const FeatureSets& features;
+  const SweepTimes& sweep;
+  /// So long after the first one.
+  double interval_s;
+};
+
+/// What was found while the first scan was taken to be straight.
+struct BentScans {
+  const LocalMap& map;
+  Eigen::Isometry3d T_map_first;
+  const OdometryResult& second;
+};
+
+/// Both scans, as a motion between them makes them.
+struct StraightenedScans {
+  /// Of the first scan.
+  LocalMap map;
+  Eigen::Isometry3d T_map_first;
+  OdometryResult second;
+};
+
 /// Builds the local map anew from the first scan, compensated for the motion that the second one
-/// shows, and registers that one again; the two converge together, from that motion or from faster
-/// ones up to `max_speed_m_s`, whichever fits best. `features` are those of the second scan, not
-/// compensated, `second` its pose, `interval_s` after the first one's, `last` the first scan's. All
-/// stay as they are where they do not converge.
-void straighten_first_scan(const FirstScan& first, const FeatureSets& features, double interval_s,
-                           const SweepTimes& sweep, const OdometryConfig& config,
-                           double max_speed_m_s, LocalMap& map, RegisteredScan& last,
-                           OdometryResult& second);
+/// shows, and registers that one again; the two converge together, from the motion that was found
+/// or from faster ones up to `max_speed_m_s`, whichever fits best. Nothing where they do not
+/// converge.
+[[nodiscard]] std::optional<StraightenedScans> straighten_first_scan(const FirstScan& first,
+                                                                     const SecondScan& second,
+                                                                     const BentScans& found,
+                                                                     const OdometryConfig& config,
+                                                                     double max_speed_m_s);
 
 }  // namespace stillmap

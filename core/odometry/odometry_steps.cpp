@@ -248,8 +248,14 @@ void Odometry::State::straighten(const FeatureSets& features, std::int64_t time_
       stamped_s > min_sweeps * sweep.duration_s ? stamped_s : intervals.since_last_s(time_ns);
   if (second.health == OdometryHealth::lost || interval_s > max_prediction_s || !features.rolling)
     return;
-  straighten_first_scan(first, features, interval_s, sweep, method(),
-                        sensor.motion_limits.max_speed_m_s, map, last, second);
+  auto straightened =
+      straighten_first_scan(first, {features, sweep, interval_s}, {map, last.T_map_lidar, second},
+                            method(), sensor.motion_limits.max_speed_m_s);
+  if (straightened) {
+    map = std::move(straightened->map);
+    last.T_map_lidar = straightened->T_map_first;
+    second = straightened->second;
+  }
   // A straight first scan settles doubts that a bent one raised, but not this one.
   if (is_movable_denied && second.health == OdometryHealth::good)
     second.health = OdometryHealth::degenerate;

@@ -51,12 +51,13 @@ double straightened_motion_m(const FeatureSets& second_features) {
   LocalMap map{LocalMapConfig{}};
   extend_local_map(map, first.features, first.T_map_stamp, {});
   const OdometryConfig config;
-  RegisteredScan last;
-  OdometryResult second =
+  const OdometryResult found =
       register_features(second_features, map, Eigen::Isometry3d::Identity(), config);
-  straighten_first_scan(first, second_features, interval_s, sweep, config,
-                        /*max_speed_m_s=*/70.0, map, last, second);
-  return (last.T_map_lidar.inverse() * second.T_map_lidar).translation().x();
+  const auto straightened = straighten_first_scan(first, {second_features, sweep, interval_s},
+                                                  {map, Eigen::Isometry3d::Identity(), found},
+                                                  config, /*max_speed_m_s=*/70.0);
+  if (!straightened) return found.T_map_lidar.translation().x();
+  return (straightened->T_map_first.inverse() * straightened->second.T_map_lidar).translation().x();
 }
 
 TEST(FirstScanTest, FeaturesThatAlsoFitFartherOnDoNotMoveALidarWhosePointsStay) {
