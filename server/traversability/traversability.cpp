@@ -21,11 +21,15 @@ Traversability::Traversability(const ServerConfig& config, dds::Participant& par
     if (publisher_) publisher_->publish();
   };
   thread_.emplace(
-      std::move(robots), std::chrono::duration<double>(config.traversability.update_period_s),
+      std::move(robots),
       FollowedMap{.latest = latest_map,
                   .tiles = tiles,
                   .bytes_on_disk = (std::size_t{config.map.memory_limit_mib} << 20) / 8},
-      snapshot_, statistics, publish, std::move(throttle));
+      snapshot_, statistics,
+      TraversabilityUpdates{
+          .period = std::chrono::duration<double>(config.traversability.update_period_s),
+          .updated = publish,
+          .throttle = std::move(throttle)});
 }
 
 }  // namespace stillmap::server

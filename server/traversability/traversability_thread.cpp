@@ -55,24 +55,18 @@ constexpr std::chrono::seconds retry_period{5};
 
 }  // namespace
 
-TraversabilityThread::TraversabilityThread(std::vector<RobotProfile> robots,
-                                           std::chrono::duration<double> period,
-                                           const FollowedMap& map, TraversabilitySnapshot& snapshot,
-                                           Statistics& statistics, std::function<void()> updated,
-                                           ThrottleCallback throttle, MonotonicClock& clock,
-                                           BackgroundScheduling scheduling)
-    : period_(period),
-      map_(map),
+TraversabilityThread::TraversabilityThread(std::vector<RobotProfile> robots, const FollowedMap& map,
+                                           TraversabilitySnapshot& snapshot, Statistics& statistics,
+                                           TraversabilityUpdates updates, MonotonicClock& clock)
+    : map_(map),
       snapshot_(snapshot),
       statistics_(statistics),
-      updated_(std::move(updated)),
-      throttle_(std::move(throttle)),
+      updates_(std::move(updates)),
       clock_(clock),
-      traversability_(std::move(robots)),
-      scheduling_(scheduling) {
+      traversability_(std::move(robots)) {
   publish();
   worker_.emplace("traversability", std::chrono::seconds(0), [this](const std::stop_token& stop) {
-    if (!std::exchange(has_begun_, true) && !use_scheduling(scheduling_)) {
+    if (!std::exchange(has_begun_, true) && !use_scheduling(updates_.scheduling)) {
       spdlog::warn("traversability is computed at full priority");
     }
     follow_map(stop);
@@ -85,7 +79,7 @@ void TraversabilityThread::follow_map(const std::stop_token& stop) {
   if (!map_update) return has_more_on_disk_ ? update_window() : follow_robot();
   clock_.sleep_until(next_update_, stop);
   if (stop.stop_requested()) return;
-  next_update_ = clock_.now() + std::chrono::duration_cast<Clock::duration>(period_);
+  next_update_ = clock_.now() + std::chrono::duration_cast<Clock::duration>(updates_.period);
   MapInWindow next;
   next.corrections = map_.latest.corrections();
   next.stamp_ns = map_.latest.newest_pose().stamp_ns;
@@ -108,7 +102,8 @@ void TraversabilityThread::follow_robot() {
   if ((robot_map - robot_map_).norm() < noticed_motion_m) return;
   robot_map_ = robot_map;
   const TileRange window = window_round(robot_map_, known_.map->tile_size_m);
-  if (window.first == known_.window.first && window.last == known_.window.last) return updated_();
+  if (window.first == known_.window.first && window.last == known_.window.last)
+    return updates_.updated();
   known_.window = window;
   update_window();
 }
@@ -171,7 +166,8 @@ void TraversabilityThread::update_window() {
   TraversabilityUpdate report;
   // On this thread only: the workers of TBB's other arenas run at full priority.
   tbb::task_arena this_thread(1);
-  this_thread.execute([&] { report = traversability_.update(part, throttle_, &map_.tiles); });
+  this_thread.execute(
+      [&] { report = traversability_.update(part, updates_.throttle, &map_.tiles); });
   retry_.reset();
   if (report.unread_tiles > 0) {
     retry_ = clock_.now() + retry_period;
@@ -181,7 +177,7 @@ void TraversabilityThread::update_window() {
                             "tried again");
   }
   publish();
-  updated_();
+  updates_.updated();
 }
 
 void TraversabilityThread::publish() {

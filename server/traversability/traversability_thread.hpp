@@ -26,20 +26,27 @@ struct FollowedMap {
   std::size_t bytes_on_disk = 0;
 };
 
+/// How it is followed, and who hears of that.
+struct TraversabilityUpdates {
+  /// The shortest time from update to update.
+  std::chrono::duration<double> period{};
+  /// Called after each update, and where the robot moved on without one, in the thread.
+  std::function<void()> updated;
+  /// Called between the portions of an update.
+  ThrottleCallback throttle{};
+  BackgroundScheduling scheduling = BackgroundScheduling::idle;
+};
+
 /// Keeps the traversability of all robots up to date with the map in a window round the robot, on a
 /// thread of idle priority that uses one core.
 class TraversabilityThread {
  public:
-  /// `period` is the shortest time from update to update; `updated` is called after each, and
-  /// where the robot moved on without one, in this thread. The time from a change of the map until
-  /// then is the latency "traversability". Publishes empty views at once. Throws
-  /// std::invalid_argument for a robot with faults, or two of one name.
-  TraversabilityThread(std::vector<RobotProfile> robots, std::chrono::duration<double> period,
-                       const FollowedMap& map, TraversabilitySnapshot& snapshot,
-                       Statistics& statistics, std::function<void()> updated,
-                       ThrottleCallback throttle = {},
-                       MonotonicClock& clock = MonotonicClock::steady(),
-                       BackgroundScheduling scheduling = BackgroundScheduling::idle);
+  /// The time from a change of the map until its update is the latency "traversability". Publishes
+  /// empty views at once. Throws std::invalid_argument for a robot with faults, or two of one name.
+  TraversabilityThread(std::vector<RobotProfile> robots, const FollowedMap& map,
+                       TraversabilitySnapshot& snapshot, Statistics& statistics,
+                       TraversabilityUpdates updates,
+                       MonotonicClock& clock = MonotonicClock::steady());
 
  private:
   void follow_map(const std::stop_token& stop);
@@ -53,16 +60,13 @@ class TraversabilityThread {
       const MapSnapshot& map, std::vector<std::shared_ptr<const Tile>>& resident) const;
   void publish();
 
-  std::chrono::duration<double> period_;
   FollowedMap map_;
   TraversabilitySnapshot& snapshot_;
   Statistics& statistics_;
-  std::function<void()> updated_;
-  ThrottleCallback throttle_;
+  TraversabilityUpdates updates_;
   MonotonicClock& clock_;
   TraversabilityMap traversability_;
   ThrottledLog throttled_log_;
-  BackgroundScheduling scheduling_;
   bool has_begun_ = false;
   MapInWindow known_;
   Eigen::Vector3d robot_map_ = Eigen::Vector3d::Zero();

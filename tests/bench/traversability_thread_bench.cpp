@@ -108,12 +108,11 @@ void tile_change_to_published_traversability(benchmark::State& state) {
   const server::TraversabilityGridProvider grid_provider(config, "map", maps, areas);
   maps.begin(std::make_shared<const MapSnapshot>(*map), {});
   const server::TraversabilityThread thread(
-      load_robots(config), std::chrono::seconds(0),
-      server::FollowedMap{.latest = maps, .tiles = tiles, .bytes_on_disk = 0}, areas, statistics,
-      [&] {
+      load_robots(config), server::FollowedMap{.latest = maps, .tiles = tiles, .bytes_on_disk = 0},
+      areas, statistics, server::TraversabilityUpdates{.updated = [&] {
         benchmark::DoNotOptimize(grid_provider.message(grid_provider.grid()));
         updates.add();
-      });
+      }});
   updates.wait_for(1);
   std::vector<double> ms;
   std::vector<double> cpu_ms;

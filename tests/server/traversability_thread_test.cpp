@@ -62,8 +62,11 @@ class TraversabilityThreadTest : public testing::Test {
       updated_.notify_all();
     };
     const FollowedMap map{.latest = latest_map_, .tiles = tiles_, .bytes_on_disk = bytes_on_disk_};
-    thread_.emplace(std::vector{square_robot(), small_robot()}, period, map, snapshot_, statistics_,
-                    updated, ThrottleCallback(), clock_, BackgroundScheduling::normal);
+    thread_.emplace(
+        std::vector{square_robot(), small_robot()}, map, snapshot_, statistics_,
+        TraversabilityUpdates{
+            .period = period, .updated = updated, .scheduling = BackgroundScheduling::normal},
+        clock_);
   }
 
   [[nodiscard]] bool wait_for(const std::function<bool(const TraversabilityView&)>& is_so) {
