@@ -81,7 +81,9 @@ ServiceContext Interface::service_context(const ServerConfig& config,
     services.query_occupancy = [occupancy](const OccupancyQuery& query) {
       return occupancy->answer(query);
     };
-    services.encode_octomap = [occupancy](bool binary) { return occupancy->encode(binary); };
+    services.encode_octomap = [occupancy](OctomapEncoding encoding) {
+      return occupancy->encode(encoding);
+    };
   }
   return services;
 }

@@ -180,8 +180,9 @@ MapSnapshot Client::get_map() {
   }
 }
 
-OctomapData Client::octomap(bool full) {
-  const auto& service = full ? services::octomap_full : services::octomap_binary;
+OctomapData Client::octomap(OctomapEncoding encoding) {
+  const auto& service =
+      encoding == OctomapEncoding::full ? services::octomap_full : services::octomap_binary;
   const auto reply = connection_->call(service, octomap_msgs::srv::GetOctomap_Request());
   // The standard's reply has no place for a reason.
   if (reply.map().id().empty()) {
@@ -190,7 +191,7 @@ OctomapData Client::octomap(bool full) {
                        "again), or the server's configuration has occupancy.enabled false");
   }
   auto data = wire::from_octomap(reply.map());
-  const bool is_sound = data && data->binary != full && check_octomap(*data).fault.empty();
+  const bool is_sound = data && data->encoding == encoding && check_octomap(*data).fault.empty();
   if (!is_sound) data.reset();
   return connection_->require_readable(std::move(data), service);
 }

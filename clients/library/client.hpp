@@ -187,9 +187,8 @@ class Client {
   /// All tiles of the map, as they are now. Throws ServiceError where one cannot be read.
   [[nodiscard]] MapSnapshot get_map();
 
-  /// The server's octree of occupied, free and unknown space, checked: with probabilities if
-  /// `full`.
-  [[nodiscard]] OctomapData octomap(bool full);
+  /// The server's octree of occupied, free and unknown space, checked.
+  [[nodiscard]] OctomapData octomap(OctomapEncoding encoding);
   /// Points, boxes and rays at once. Each answer has its own fault; throws ServiceError when the
   /// query as a whole is refused.
   [[nodiscard]] OccupancyAnswers query_occupancy(const OccupancyQuery& query);

@@ -107,7 +107,8 @@ OccupancyMap::OccupancyMap(const OctomapData& data)
     : state_(std::make_unique<State>(config_of(data))) {
   if (data.bytes.empty()) return;
   std::istringstream in(data.bytes);
-  data.binary ? state_->octree.readBinaryData(in) : state_->octree.readData(in);
+  data.encoding == OctomapEncoding::binary ? state_->octree.readBinaryData(in)
+                                           : state_->octree.readData(in);
 }
 
 OccupancyMap::~OccupancyMap() = default;
@@ -246,8 +247,8 @@ OccupancyAnswers OccupancyMap::answer(const OccupancyQuery& query,
   return answers;
 }
 
-OctomapData OccupancyMap::encode(bool binary, const ThrottleCallback& pause) const {
-  return {binary, state_->config.resolution_m, encode_octree(state_->octree, binary, pause)};
+OctomapData OccupancyMap::encode(OctomapEncoding encoding, const ThrottleCallback& pause) const {
+  return {encoding, state_->config.resolution_m, encode_octree(state_->octree, encoding, pause)};
 }
 
 std::uint64_t OccupancyMap::version() const { return state_->version; }

@@ -72,7 +72,8 @@ class OccupancyMap {
                                         const ThrottleCallback& pause = {}) const;
 
   /// In OctoMap's encoding; binary data is pruned. `pause` as above.
-  [[nodiscard]] OctomapData encode(bool binary, const ThrottleCallback& pause = {}) const;
+  [[nodiscard]] OctomapData encode(OctomapEncoding encoding,
+                                   const ThrottleCallback& pause = {}) const;
 
   /// Incremented by every insertion.
   [[nodiscard]] std::uint64_t version() const;

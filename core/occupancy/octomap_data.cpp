@@ -14,12 +14,12 @@ constexpr unsigned tree_depth = 16;
 /// Reads nodes in the order in which they are written: depth first, children in order.
 class EncodingWalk {
  public:
-  explicit EncodingWalk(const OctomapData& data) : bytes_(data.bytes), binary_(data.binary) {}
+  explicit EncodingWalk(const OctomapData& data) : bytes_(data.bytes), encoding_(data.encoding) {}
 
   OctomapCheck check() {
     if (bytes_.empty()) return result_;
     ++result_.nodes;
-    binary_ ? read_binary_node(0) : read_full_node(0);
+    encoding_ == OctomapEncoding::binary ? read_binary_node(0) : read_full_node(0);
     if (result_.fault.empty() && at_ != bytes_.size()) {
       fail(std::to_string(bytes_.size() - at_) + " bytes follow the octree's end");
     }
@@ -72,7 +72,7 @@ class EncodingWalk {
   }
 
   const std::string& bytes_;
-  bool binary_;
+  OctomapEncoding encoding_;
   std::size_t at_ = 0;
   OctomapCheck result_;
 };

@@ -5,11 +5,18 @@
 
 namespace stillmap {
 
-/// An octree in OctoMap's encoding: the data of a .bt or .ot file after its header, and of an
-/// octomap_msgs/Octomap.
+/// OctoMap's encodings.
+enum class OctomapEncoding : std::uint8_t {
+  /// Occupied and free only (.bt).
+  binary,
+  /// Every voxel's log-odds (.ot).
+  full,
+};
+
+/// An octree in one of OctoMap's encodings: the data of a .bt or .ot file after its header, and of
+/// an octomap_msgs/Octomap.
 struct OctomapData {
-  /// Occupied and free only (.bt), or every voxel's log-odds (.ot).
-  bool binary = true;
+  OctomapEncoding encoding = OctomapEncoding::binary;
   double resolution_m = 0.0;
   /// Empty for an empty map.
   std::string bytes;

@@ -15,14 +15,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const char* first_line(bool binary) {
-  return binary ? "# Octomap OcTree binary file" : "# Octomap OcTree file";
+const char* first_line(OctomapEncoding encoding) {
+  return encoding == OctomapEncoding::binary ? "# Octomap OcTree binary file"
+                                             : "# Octomap OcTree file";
 }
 
 std::string header_of(const OctomapData& data, std::uint64_t nodes) {
   std::ostringstream header;
   header.precision(std::numeric_limits<double>::max_digits10);
-  header << first_line(data.binary) << "\n# (feel free to add / change comments, but leave the "
+  header << first_line(data.encoding) << "\n# (feel free to add / change comments, but leave the "
          << "first line as it is!)\n#\nid " << OctomapData::tree_id << "\nsize " << nodes
          << "\nres " << data.resolution_m << "\ndata\n";
   return header.str();
@@ -62,16 +63,16 @@ std::string read_all(const fs::path& file) {
 
 }  // namespace
 
-bool is_binary_octomap(const fs::path& file) {
-  if (file.extension() == ".bt") return true;
-  if (file.extension() == ".ot") return false;
+OctomapEncoding octomap_encoding_of(const fs::path& file) {
+  if (file.extension() == ".bt") return OctomapEncoding::binary;
+  if (file.extension() == ".ot") return OctomapEncoding::full;
   throw MapFileError(file,
                      "the name must end in .bt (occupied and free only) or .ot (with "
                      "probabilities)");
 }
 
 void write_octomap_file(const fs::path& file, const OctomapData& data) {
-  assert(is_binary_octomap(file) == data.binary);
+  assert(octomap_encoding_of(file) == data.encoding);
   FileBeside beside(file);
   std::ofstream out(beside.path(), std::ios::binary | std::ios::trunc);
   out << header_of(data, check_octomap(data).nodes) << data.bytes;
@@ -82,12 +83,12 @@ void write_octomap_file(const fs::path& file, const OctomapData& data) {
 
 OctomapData read_octomap_file(const fs::path& file) {
   OctomapData data;
-  data.binary = is_binary_octomap(file);
+  data.encoding = octomap_encoding_of(file);
   std::istringstream in(read_all(file));
   std::string line;
   std::getline(in, line);
-  if (line != first_line(data.binary)) {
-    throw MapFileError(file, std::string("does not begin with '") + first_line(data.binary) +
+  if (line != first_line(data.encoding)) {
+    throw MapFileError(file, std::string("does not begin with '") + first_line(data.encoding) +
                                  "': it is no such file, or damaged");
   }
   const Header header = read_header(in, file);

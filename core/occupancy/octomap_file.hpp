@@ -7,12 +7,12 @@
 
 namespace stillmap {
 
-/// Whether the file's extension is that of the binary format (.bt) and not the full one (.ot).
-/// Throws MapFileError for any other.
-[[nodiscard]] bool is_binary_octomap(const std::filesystem::path& file);
+/// The encoding that the file's extension names: .bt binary, .ot full. Throws MapFileError for any
+/// other.
+[[nodiscard]] OctomapEncoding octomap_encoding_of(const std::filesystem::path& file);
 
 /// Writes a file that octovis and other OctoMap programs open. An existing file is replaced
-/// atomically. Throws MapFileError. @pre the extension matches data.binary
+/// atomically. Throws MapFileError. @pre the extension matches data.encoding
 void write_octomap_file(const std::filesystem::path& file, const OctomapData& data);
 
 /// Reads and checks such a file. Throws MapFileError.

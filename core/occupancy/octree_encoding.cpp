@@ -31,7 +31,8 @@ using WrittenChildren = std::array<WrittenNode, 8>;
 /// ended, since only then it is known what it has.
 class NodeWriter {
  public:
-  NodeWriter(const OcTree& octree, bool binary) : octree_(octree), binary_(binary) {}
+  NodeWriter(const OcTree& octree, OctomapEncoding encoding)
+      : octree_(octree), is_binary_(encoding == OctomapEncoding::binary) {}
 
   /// The node with all below it.
   WrittenNode write(const OcTreeNode& node, std::string& out) const {
@@ -48,7 +49,7 @@ class NodeWriter {
   /// Where the node begins in `out`.
   [[nodiscard]] std::size_t begin_inner(std::string& out) const {
     const std::size_t begin = out.size();
-    out.append(binary_ ? 2 : sizeof(float) + 1, '\0');
+    out.append(is_binary_ ? 2 : sizeof(float) + 1, '\0');
     return begin;
   }
 
@@ -68,7 +69,7 @@ class NodeWriter {
       out.resize(begin);
       return node;
     }
-    if (!binary_) {
+    if (!is_binary_) {
       put(node.log_odds, present, begin, out);
       node.kind = Written::inner;
     } else if (!is_root && (kinds == all_free || kinds == all_occupied)) {
@@ -88,7 +89,7 @@ class NodeWriter {
   static constexpr unsigned all_occupied = 0xAAAA;
 
   WrittenNode write_leaf(const OcTreeNode& leaf, std::string& out) const {
-    if (!binary_) put(leaf.getLogOdds(), 0, begin_inner(out), out);
+    if (!is_binary_) put(leaf.getLogOdds(), 0, begin_inner(out), out);
     return {.kind = octree_.isNodeOccupied(&leaf) ? Written::occupied : Written::free,
             .log_odds = leaf.getLogOdds()};
   }
@@ -99,7 +100,7 @@ class NodeWriter {
   }
 
   const OcTree& octree_;
-  bool binary_;
+  bool is_binary_;
 };
 
 /// Puts the nodes above the parts round them.
@@ -151,8 +152,9 @@ class Assembly {
 
 }  // namespace
 
-std::string encode_octree(const OcTree& octree, bool binary, const ThrottleCallback& pause) {
-  const NodeWriter writer(octree, binary);
+std::string encode_octree(const OcTree& octree, OctomapEncoding encoding,
+                          const ThrottleCallback& pause) {
+  const NodeWriter writer(octree, encoding);
   const OctreeParts found = parts_of(octree, VoxelKey::Zero(), VoxelKey::Constant(octree_side - 1));
   std::vector<Assembly::Piece> pieces;
   pieces.reserve(found.parts.size());

@@ -168,7 +168,7 @@ octomap_msgs::msg::Octomap to_octomap(const OctomapData& data, std::int64_t stam
                                       const std::string& map_frame) {
   octomap_msgs::msg::Octomap message;
   message.header(to_header(stamp_ns, map_frame));
-  message.binary(data.binary);
+  message.binary(data.encoding == OctomapEncoding::binary);
   message.id(OctomapData::tree_id);
   message.resolution(data.resolution_m);
   message.data().assign(data.bytes.begin(), data.bytes.end());
@@ -177,7 +177,7 @@ octomap_msgs::msg::Octomap to_octomap(const OctomapData& data, std::int64_t stam
 
 std::optional<OctomapData> from_octomap(const octomap_msgs::msg::Octomap& message) {
   if (message.id() != OctomapData::tree_id || !(message.resolution() > 0.0)) return std::nullopt;
-  return OctomapData{.binary = message.binary(),
+  return OctomapData{.encoding = message.binary() ? OctomapEncoding::binary : OctomapEncoding::full,
                      .resolution_m = message.resolution(),
                      .bytes = {message.data().begin(), message.data().end()}};
 }

@@ -120,7 +120,7 @@ void OccupancyThread::run(NewMap job) {
 
 void OccupancyThread::run(Encoding job) {
   // Only this thread changes the map: queries may go on meanwhile.
-  job.encoded.set_value({map_.encode(true), stamp_ns_});
+  job.encoded.set_value({map_.encode(OctomapEncoding::binary), stamp_ns_});
 }
 
 void OccupancyThread::run(OccupancyScan scan) {
@@ -207,10 +207,10 @@ OccupancyAnswers OccupancyThread::answer(const OccupancyQuery& query) const {
   });
 }
 
-EncodedOctree OccupancyThread::encode(bool binary) const {
+EncodedOctree OccupancyThread::encode(OctomapEncoding encoding) const {
   return of_one_map(
       [&](const OccupancyMap& map, std::int64_t stamp_ns, const ThrottleCallback& pause) {
-        return EncodedOctree{map.encode(binary, pause), stamp_ns};
+        return EncodedOctree{map.encode(encoding, pause), stamp_ns};
       });
 }
 

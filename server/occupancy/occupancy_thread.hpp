@@ -77,7 +77,7 @@ class OccupancyThread {
   /// all of an answer is of one map.
   [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query) const;
   /// Encodes on the calling thread; the stamp is of the call's beginning. As `answer`.
-  [[nodiscard]] EncodedOctree encode(bool binary) const;
+  [[nodiscard]] EncodedOctree encode(OctomapEncoding encoding) const;
   /// Encodes on this object's thread, before the scans that wait; one request at a time. The future
   /// throws std::future_error when the thread ends before.
   [[nodiscard]] std::future<EncodedOctree> encode_in_background();

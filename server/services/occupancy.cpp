@@ -8,11 +8,12 @@ using namespace stillmap_msgs::srv;
 
 namespace {
 
-octomap_msgs::srv::GetOctomap_Response octomap(const ServiceContext& context, bool binary) {
+octomap_msgs::srv::GetOctomap_Response octomap(const ServiceContext& context,
+                                               OctomapEncoding encoding) {
   octomap_msgs::srv::GetOctomap_Response response;
   if (!context.encode_octomap) return response;
   try {
-    const EncodedOctree octree = context.encode_octomap(binary);
+    const EncodedOctree octree = context.encode_octomap(encoding);
     response.map(wire::to_octomap(octree.data, octree.stamp_ns, context.map_frame));
   } catch (const OctreeNotMade&) {
     // The standard's reply has no place for a reason; one without a name is none.
@@ -24,12 +25,12 @@ octomap_msgs::srv::GetOctomap_Response octomap(const ServiceContext& context, bo
 
 octomap_msgs::srv::GetOctomap_Response octomap_binary(
     const ServiceContext& context, const octomap_msgs::srv::GetOctomap_Request&) {
-  return octomap(context, true);
+  return octomap(context, OctomapEncoding::binary);
 }
 
 octomap_msgs::srv::GetOctomap_Response octomap_full(const ServiceContext& context,
                                                     const octomap_msgs::srv::GetOctomap_Request&) {
-  return octomap(context, false);
+  return octomap(context, OctomapEncoding::full);
 }
 
 QueryOccupancy_Response query_occupancy(const ServiceContext& context,

@@ -44,7 +44,7 @@ struct ServiceContext {
   std::function<LocalizationAnswer(const LocalizationQuestion&)> localize;
   /// Both are empty when the server keeps no octree.
   std::function<OccupancyAnswers(const OccupancyQuery&)> query_occupancy;
-  std::function<EncodedOctree(bool binary)> encode_octomap;
+  std::function<EncodedOctree(OctomapEncoding encoding)> encode_octomap;
   const TraversabilityCache& traversability;
   const TraversabilityGridProvider& grid_provider;
   std::string map_frame;

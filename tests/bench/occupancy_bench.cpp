@@ -143,12 +143,13 @@ double file_bytes(const fs::path& file) {
 
 double octomap_file_bytes(const OccupancyMap& map, const char* name) {
   const fs::path file = fs::temp_directory_path() / name;
-  write_octomap_file(file, map.encode(is_binary_octomap(file)));
+  write_octomap_file(file, map.encode(octomap_encoding_of(file)));
   return file_bytes(file);
 }
 
 void report_octree(benchmark::State& state, const OccupancyMap& map, double voxels) {
-  const double heap = heap_bytes_of([&] { return OccupancyMap(map.encode(false)); });
+  const double heap =
+      heap_bytes_of([&] { return OccupancyMap(map.encode(OctomapEncoding::full)); });
   state.counters["voxels"] = voxels;
   state.counters["nodes"] = static_cast<double>(map.size().nodes);
   state.counters["memory_usage_MiB"] = static_cast<double>(map.size().memory_bytes) / 1048576.0;

@@ -8,7 +8,7 @@ namespace stillmap::wire {
 namespace {
 
 TEST(OctomapConversion, KeepsEveryByte) {
-  OctomapData data{.binary = false, .resolution_m = 0.05, .bytes = {}};
+  OctomapData data{.encoding = OctomapEncoding::full, .resolution_m = 0.05, .bytes = {}};
   for (int byte = 0; byte < 256; ++byte) data.bytes.push_back(static_cast<char>(byte));
   const auto message = to_octomap(data, 1'500'000'000, "map");
   EXPECT_EQ(message.id(), "OcTree");
@@ -16,13 +16,14 @@ TEST(OctomapConversion, KeepsEveryByte) {
   EXPECT_EQ(message.header().stamp().sec(), 1);
   const auto back = from_octomap(message);
   ASSERT_TRUE(back);
-  EXPECT_EQ(back->binary, data.binary);
+  EXPECT_EQ(back->encoding, data.encoding);
   EXPECT_EQ(back->resolution_m, data.resolution_m);
   EXPECT_EQ(back->bytes, data.bytes);
 }
 
 TEST(OctomapConversion, RefusesOtherTreesAndResolutions) {
-  auto message = to_octomap({.binary = true, .resolution_m = 0.2, .bytes = {}}, 0, "map");
+  auto message =
+      to_octomap({.encoding = OctomapEncoding::binary, .resolution_m = 0.2, .bytes = {}}, 0, "map");
   message.id("ColorOcTree");
   EXPECT_FALSE(from_octomap(message));
   message.id("OcTree");

@@ -62,7 +62,8 @@ TEST(OccupancyMap, UpdatesInPortionsEqualOneUpdate) {
   }
   EXPECT_GE(pauses, 2 * 300 / 64);
   EXPECT_GT(portions, 10);
-  EXPECT_EQ(map.encode(false).bytes, undisturbed.encode(false).bytes);
+  EXPECT_EQ(map.encode(OctomapEncoding::full).bytes,
+            undisturbed.encode(OctomapEncoding::full).bytes);
 }
 
 TEST(OccupancyMap, DynamicAndMovableObjectsAreNotOccupiedButTheirRaysClear) {

@@ -60,7 +60,7 @@ TEST_F(PagedStreet, CountsItsNodesCorrectlyAfterEviction) {
   const OccupancySize whole = map_.size();
   map_.sync_residency(without_tiles_before(140.0));
   EXPECT_LT(map_.size().memory_bytes, whole.memory_bytes);
-  EXPECT_EQ(map_.size().nodes, OccupancyMap(map_.encode(false)).size().nodes);
+  EXPECT_EQ(map_.size().nodes, OccupancyMap(map_.encode(OctomapEncoding::full)).size().nodes);
 }
 
 TEST_F(PagedStreet, InsertsTheVoxelsOfReloadedTilesAsOccupied) {

@@ -27,6 +27,9 @@ OccupancyMap some_map() {
 class OctomapFile : public testing::TestWithParam<const char*> {
  protected:
   [[nodiscard]] bool is_binary() const { return std::string(GetParam()) == "map.bt"; }
+  [[nodiscard]] OctomapEncoding encoding() const {
+    return is_binary() ? OctomapEncoding::binary : OctomapEncoding::full;
+  }
   [[nodiscard]] std::filesystem::path file() const { return folder_ / GetParam(); }
   ScratchFolder folder_;
   OccupancyMap map_ = some_map();
@@ -36,7 +39,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, OctomapFile, testing::Values("map.bt", "map.ot")
                          [](const auto& tested) { return std::string(tested.param + 4, 2); });
 
 TEST_P(OctomapFile, ComesBackWithTheSameAnswers) {
-  write_octomap_file(file(), map_.encode(is_binary()));
+  write_octomap_file(file(), map_.encode(encoding()));
   const OccupancyMap back(read_octomap_file(file()));
   EXPECT_EQ(back.resolution_m(), map_.resolution_m());
   for (const Eigen::Vector3f& p : random_scan(77, 5000, 9.0).scan.scan.points_lidar) {
@@ -45,11 +48,11 @@ TEST_P(OctomapFile, ComesBackWithTheSameAnswers) {
     ASSERT_EQ(after.occupancy, before.occupancy);
     ASSERT_TRUE(is_binary() || after.probability == before.probability);
   }
-  EXPECT_EQ(back.encode(is_binary()).bytes, map_.encode(is_binary()).bytes);
+  EXPECT_EQ(back.encode(encoding()).bytes, map_.encode(encoding()).bytes);
 }
 
 TEST_P(OctomapFile, IsReadByOctoMapItself) {
-  write_octomap_file(file(), map_.encode(is_binary()));
+  write_octomap_file(file(), map_.encode(encoding()));
   octomap::OcTree binary(1.0);
   std::unique_ptr<octomap::AbstractOcTree> full;
   const octomap::OcTree* read = &binary;
@@ -72,19 +75,19 @@ TEST_P(OctomapFile, IsReadByOctoMapItself) {
 }
 
 TEST_P(OctomapFile, OfAnEmptyMapIsAnEmptyMap) {
-  write_octomap_file(file(), OccupancyMap(OccupancyConfig{}).encode(is_binary()));
+  write_octomap_file(file(), OccupancyMap(OccupancyConfig{}).encode(encoding()));
   EXPECT_EQ(OccupancyMap(read_octomap_file(file())).size().nodes, 0U);
 }
 
 TEST_P(OctomapFile, ReplacesAnOldFileAndLeavesNothingBeside) {
   static_cast<void>(folder_.file(GetParam(), "old"));
-  write_octomap_file(file(), map_.encode(is_binary()));
-  EXPECT_EQ(read_octomap_file(file()).bytes, map_.encode(is_binary()).bytes);
+  write_octomap_file(file(), map_.encode(encoding()));
+  EXPECT_EQ(read_octomap_file(file()).bytes, map_.encode(encoding()).bytes);
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_.path()), {}), 1);
 }
 
 TEST_P(OctomapFile, ThatIsDamagedIsRefusedByName) {
-  write_octomap_file(file(), map_.encode(is_binary()));
+  write_octomap_file(file(), map_.encode(encoding()));
   const std::string whole = content_of(file());
   const auto refusal = [&](const std::string& content) {
     static_cast<void>(folder_.file(GetParam(), content));
@@ -109,7 +112,7 @@ TEST_P(OctomapFile, ThatIsDamagedIsRefusedByName) {
 }
 
 TEST_P(OctomapFile, WithRandomFaultsNeverDoesHarm) {
-  const OctomapData good = map_.encode(is_binary());
+  const OctomapData good = map_.encode(encoding());
   std::mt19937 generator(3);
   std::uniform_int_distribution<std::size_t> place(0, good.bytes.size() - 1);
   std::uniform_int_distribution<int> byte(0, 255);
@@ -127,9 +130,9 @@ TEST_P(OctomapFile, WithRandomFaultsNeverDoesHarm) {
 }
 
 TEST(OctomapFileName, DecidesTheKind) {
-  EXPECT_TRUE(is_binary_octomap("a/b.bt"));
-  EXPECT_FALSE(is_binary_octomap("b.ot"));
-  EXPECT_THAT(message_of<MapFileError>([] { static_cast<void>(is_binary_octomap("b.ply")); }),
+  EXPECT_EQ(octomap_encoding_of("a/b.bt"), OctomapEncoding::binary);
+  EXPECT_EQ(octomap_encoding_of("b.ot"), OctomapEncoding::full);
+  EXPECT_THAT(message_of<MapFileError>([] { static_cast<void>(octomap_encoding_of("b.ply")); }),
               HasSubstr("b.ply: the name must end in .bt"));
 }
 
@@ -138,8 +141,10 @@ TEST(OctomapFileThatCannotBe, IsNamed) {
   EXPECT_THAT(
       message_of<MapFileError>([&] { static_cast<void>(read_octomap_file(folder / "none.bt")); }),
       HasSubstr("none.bt: cannot be read"));
-  EXPECT_THAT(message_of<MapFileError>(
-                  [&] { write_octomap_file(folder / "no" / "map.bt", some_map().encode(true)); }),
+  EXPECT_THAT(message_of<MapFileError>([&] {
+                write_octomap_file(folder / "no" / "map.bt",
+                                   some_map().encode(OctomapEncoding::binary));
+              }),
               HasSubstr("cannot be written"));
 }
 
@@ -154,7 +159,7 @@ TEST_P(OctomapFile, OfOtherProgramsIsReadWhateverItsResolution) {
     EXPECT_EQ(map.at_point(p_map).occupancy, Occupancy::occupied);
   }
   // What would be no resolution is still refused, by the file's name.
-  OctomapData none = map_.encode(is_binary());
+  OctomapData none = map_.encode(encoding());
   none.resolution_m = 1e-300;
   write_octomap_file(file(), none);
   EXPECT_THAT(message_of<MapFileError>([&] { static_cast<void>(read_octomap_file(file())); }),

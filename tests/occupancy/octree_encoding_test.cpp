@@ -47,9 +47,9 @@ octomap::OcTree any_octree(std::uint32_t seed) {
   return octree;
 }
 
-std::string as_octomap_writes_it(const octomap::OcTree& octree, bool binary) {
+std::string as_octomap_writes_it(const octomap::OcTree& octree, OctomapEncoding encoding) {
   std::ostringstream out;
-  if (binary) {
+  if (encoding == OctomapEncoding::binary) {
     octomap::OcTree max_likelihood(octree);
     max_likelihood.toMaxLikelihood();
     max_likelihood.prune();
@@ -60,7 +60,7 @@ std::string as_octomap_writes_it(const octomap::OcTree& octree, bool binary) {
   return std::move(out).str();
 }
 
-class OctreeEncoding : public testing::TestWithParam<bool> {};
+class OctreeEncoding : public testing::TestWithParam<OctomapEncoding> {};
 
 TEST_P(OctreeEncoding, IsThatOfOctoMapByteForByte) {
   for (std::uint32_t seed = 0; seed < 5; ++seed) {
@@ -92,13 +92,16 @@ TEST_P(OctreeEncoding, IsSoundWhateverChangesInItsPauses) {
     };
     const std::string bytes = encode_octree(octree, GetParam(), change);
     const OctomapCheck check =
-        check_octomap({.binary = GetParam(), .resolution_m = resolution_m, .bytes = bytes});
+        check_octomap({.encoding = GetParam(), .resolution_m = resolution_m, .bytes = bytes});
     EXPECT_EQ(check.fault, "") << seed;
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(BothKinds, OctreeEncoding, testing::Bool(),
-                         [](const auto& kind) { return kind.param ? "binary" : "full"; });
+INSTANTIATE_TEST_SUITE_P(BothKinds, OctreeEncoding,
+                         testing::Values(OctomapEncoding::full, OctomapEncoding::binary),
+                         [](const auto& kind) {
+                           return kind.param == OctomapEncoding::binary ? "binary" : "full";
+                         });
 
 TEST(OctreePart, IsFoundAsTheOctreeIsNow) {
   octomap::OcTree octree(resolution_m);

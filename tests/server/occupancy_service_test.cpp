@@ -58,9 +58,9 @@ class OccupancyService : public testing::Test {
 };
 
 TEST_F(OccupancyService, GivesAnOctomapThatHoldsTheRoom) {
-  for (const bool full : {false, true}) {
-    const OctomapData data = client_.octomap(full);
-    EXPECT_EQ(data.binary, !full);
+  for (const OctomapEncoding encoding : {OctomapEncoding::binary, OctomapEncoding::full}) {
+    const OctomapData data = client_.octomap(encoding);
+    EXPECT_EQ(data.encoding, encoding);
     EXPECT_EQ(data.resolution_m, 0.2);
     const BoxOccupancy all = OccupancyMap(data).in_box(everything(), 0);
     EXPECT_EQ(all.occupied, voxels().occupied);
@@ -69,7 +69,7 @@ TEST_F(OccupancyService, GivesAnOctomapThatHoldsTheRoom) {
 }
 
 TEST_F(OccupancyService, AnswersPointsBoxesAndRaysOfOneRequest) {
-  const OccupancyMap map(client_.octomap(true));
+  const OccupancyMap map(client_.octomap(OctomapEncoding::full));
   OccupancyQuery query;
   query.points_map = {{0.0, 0.0, 0.1}, {3.0, 1.0, 0.1}, {900.0, 0.0, 0.0}};
   query.boxes_map = {everything()};
@@ -170,13 +170,13 @@ class LateReader {
 
 TEST_F(OccupancyService, WhoComesLateGetsTheOctreeAsItIsNow) {
   const std::size_t early_bytes = LateReader(client_).first_bytes(patience);
-  EXPECT_EQ(early_bytes, client_.octomap(false).bytes.size());
+  EXPECT_EQ(early_bytes, client_.octomap(OctomapEncoding::binary).bytes.size());
   drive(publisher_, 8, 60);
   ASSERT_TRUE(wait_for_scans(client_, 60));
   ASSERT_TRUE(eventually([&] {
     return scans_in_octree() + client_.status().counter("occupancy_scans_dropped") == 60;
   }));
-  const std::size_t now_bytes = client_.octomap(false).bytes.size();
+  const std::size_t now_bytes = client_.octomap(OctomapEncoding::binary).bytes.size();
   EXPECT_NE(now_bytes, early_bytes);
   EXPECT_EQ(LateReader(client_).first_bytes(patience), now_bytes);
 }
@@ -196,7 +196,7 @@ TEST_F(OccupancyService, WhoComesLateGetsNoOctreeOfAMapThatIsNoMore) {
 TEST_F(OccupancyService, AResetBeginsAnEmptyOctree) {
   static_cast<void>(client_.reset());
   EXPECT_TRUE(eventually([&] { return voxels().occupied == 0; }));
-  EXPECT_TRUE(client_.octomap(true).bytes.empty());
+  EXPECT_TRUE(client_.octomap(OctomapEncoding::full).bytes.empty());
 }
 
 TEST(OccupancyAfterARestart, BeginsWithTheStoredStaticMap) {
@@ -233,7 +233,7 @@ TEST(OccupancyAfterARestart, BeginsWithTheStoredStaticMap) {
       return false;
     }
   }));
-  EXPECT_FALSE(client.octomap(true).bytes.empty());
+  EXPECT_FALSE(client.octomap(OctomapEncoding::full).bytes.empty());
   for (const PointOccupancy& point : client.query_occupancy(query).points) {
     ASSERT_EQ(point.occupancy, Occupancy::occupied);
     EXPECT_NEAR(point.probability, 0.971F, 1e-3F);

@@ -65,8 +65,8 @@ TEST_F(OccupancyThreadTest, MakesWhatTheMapWouldMake) {
     thread.add(scan);
     ASSERT_TRUE(done(thread, static_cast<std::uint64_t>(i) + 1));
   }
-  const server::EncodedOctree octree = thread.encode(false);
-  EXPECT_EQ(octree.data.bytes, map.encode(false).bytes);
+  const server::EncodedOctree octree = thread.encode(OctomapEncoding::full);
+  EXPECT_EQ(octree.data.bytes, map.encode(OctomapEncoding::full).bytes);
   EXPECT_EQ(octree.stamp_ns, room_scan(3).stamp_ns);
   EXPECT_EQ(counted(statistics_, "occupancy_not_cleared"), 0U);
 }
@@ -79,8 +79,8 @@ TEST_F(OccupancyThreadTest, EncodesInTheBackgroundWhatItEncodesAtOnce) {
     std::future<server::EncodedOctree> encoded = thread.encode_in_background();
     ASSERT_EQ(encoded.wait_for(patience), std::future_status::ready);
     const server::EncodedOctree octree = encoded.get();
-    EXPECT_TRUE(octree.data.binary);
-    EXPECT_EQ(octree.data.bytes, thread.encode(true).data.bytes);
+    EXPECT_EQ(octree.data.encoding, OctomapEncoding::binary);
+    EXPECT_EQ(octree.data.bytes, thread.encode(OctomapEncoding::binary).data.bytes);
     EXPECT_EQ(octree.stamp_ns, room_scan(0).stamp_ns);
   }
 }
@@ -163,7 +163,7 @@ TEST_F(BegunOccupancyThreadTest, WaitsForTheOctreeOfAMapThatBeginsWithVoxels) {
   EXPECT_EQ(asked.wait_for(100ms), std::future_status::timeout) << "nothing known is no answer";
   set_open(true);
   EXPECT_GT(asked.get().occupied, 100U);
-  EXPECT_FALSE(thread.encode(true).data.bytes.empty());
+  EXPECT_FALSE(thread.encode(OctomapEncoding::binary).data.bytes.empty());
 }
 
 // By a thread that answers requests one after the other.
@@ -175,7 +175,7 @@ TEST_F(GatedOccupancyThreadTest, RefusesAllWhoAskForAnOctreeThatIsNotMadeWithinO
   ASSERT_TRUE(waits());
   EXPECT_THROW(static_cast<void>(all_of(thread)), server::OctreeNotMade);
   EXPECT_GE(std::chrono::steady_clock::now() - began, server::OccupancyThread::longest_wait);
-  EXPECT_THROW(static_cast<void>(thread.encode(true)), server::OctreeNotMade);
+  EXPECT_THROW(static_cast<void>(thread.encode(OctomapEncoding::binary)), server::OctreeNotMade);
   EXPECT_THROW(static_cast<void>(all_of(thread)), server::OctreeNotMade);
   EXPECT_LT(std::chrono::steady_clock::now() - began, 2 * server::OccupancyThread::longest_wait);
   set_open(true);
@@ -202,7 +202,8 @@ TEST_F(GatedOccupancyThreadTest, ShowsNothingOfTheOldMapWhileANewOneWaitsForAGap
   thread.begin(map.view());
   ASSERT_TRUE(waits());
   EXPECT_EQ(all_of(thread).occupied, 0U);
-  EXPECT_EQ(thread.encode(true).data.bytes, OccupancyMap(OccupancyConfig{}).encode(true).bytes);
+  EXPECT_EQ(thread.encode(OctomapEncoding::binary).data.bytes,
+            OccupancyMap(OccupancyConfig{}).encode(OctomapEncoding::binary).bytes);
   set_open(true);
   EXPECT_TRUE(done(thread, 2));
   EXPECT_EQ(all_of(thread).occupied, 0U);
@@ -249,7 +250,8 @@ TEST_F(GatedOccupancyThreadTest, NoOctreeOfAnOldMapIsPublishedWhileAnotherIsEnco
   })) << "of a map that is no more";
   set_open(true);
   ASSERT_TRUE(late->take(octree, {}, patience));
-  EXPECT_EQ(octree.data().size(), OccupancyMap(OccupancyConfig{}).encode(true).bytes.size());
+  EXPECT_EQ(octree.data().size(),
+            OccupancyMap(OccupancyConfig{}).encode(OctomapEncoding::binary).bytes.size());
 }
 
 TEST_F(OccupancyThreadTest, TakesEveryScanWholeWhereEachCounts) {
@@ -266,7 +268,8 @@ TEST_F(OccupancyThreadTest, TakesEveryScanWholeWhereEachCounts) {
   ASSERT_TRUE(done(thread, scans));
   EXPECT_EQ(counted(statistics_, "occupancy_scans_dropped"), 0U);
   EXPECT_EQ(counted(statistics_, "occupancy_not_cleared"), 0U);
-  EXPECT_EQ(thread.encode(false).data.bytes, map.encode(false).bytes);
+  EXPECT_EQ(thread.encode(OctomapEncoding::full).data.bytes,
+            map.encode(OctomapEncoding::full).bytes);
 }
 
 /// Of `points` all round, 20 m away.
@@ -290,10 +293,10 @@ TEST_F(OccupancyThreadTest, NoScanWaitsForAnAnswerToEnd) {
   thread.add(wide_view(4000));
   ASSERT_TRUE(done(thread, 1));
   auto began = Clock::now();
-  EXPECT_FALSE(thread.encode(false).data.bytes.empty());
+  EXPECT_FALSE(thread.encode(OctomapEncoding::full).data.bytes.empty());
   const auto answer_took = Clock::now() - began;
   const std::jthread client([&](const std::stop_token& stop) {
-    while (!stop.stop_requested()) static_cast<void>(thread.encode(false));
+    while (!stop.stop_requested()) static_cast<void>(thread.encode(OctomapEncoding::full));
   });
   Clock::duration longest{};
   for (std::uint64_t scans = 2; scans < 12; ++scans) {

@@ -241,8 +241,8 @@ class OccupancySource {
       map_.emplace(open_map(arguments));
     }
   }
-  [[nodiscard]] OctomapData octomap(bool binary) {
-    return map_ ? map_->encode(binary) : client_->octomap(!binary);
+  [[nodiscard]] OctomapData octomap(OctomapEncoding encoding) {
+    return map_ ? map_->encode(encoding) : client_->octomap(encoding);
   }
   [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query) {
     return map_ ? map_->answer(query) : client_->query_occupancy(query);
@@ -271,7 +271,8 @@ ExitCode run(const OctomapArguments& arguments) {
   const OccupancyQuery query = query_of(arguments);
   const bool asks =
       !arguments.points.empty() || !arguments.boxes.empty() || !arguments.rays.empty();
-  const bool binary = arguments.output.empty() || is_binary_octomap(arguments.output);
+  const OctomapEncoding encoding =
+      arguments.output.empty() ? OctomapEncoding::binary : octomap_encoding_of(arguments.output);
   OccupancySource source(arguments);
   Json report;
   std::string text;
@@ -282,7 +283,7 @@ ExitCode run(const OctomapArguments& arguments) {
     text += describe(query, answers);
   }
   if (!asks || !arguments.output.empty()) {
-    const OctomapData data = source.octomap(binary);
+    const OctomapData data = source.octomap(encoding);
     const OctomapSummary summary = summarize(data);
     report.set("octomap", to_json(summary));
     text += describe(summary);

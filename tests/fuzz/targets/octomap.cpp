@@ -29,7 +29,8 @@ std::optional<OctomapData> read(Kind kind, ByteSource& source) {
   if (kind == binary_file) return read_octomap_file(folder.file("octree.bt", source.rest()));
   if (kind == full_file) return read_octomap_file(folder.file("octree.ot", source.rest()));
   const double resolution_m = source.value<double>();
-  return OctomapData{kind == binary_tree, resolution_m, text_of(source.rest())};
+  return OctomapData{kind == binary_tree ? OctomapEncoding::binary : OctomapEncoding::full,
+                     resolution_m, text_of(source.rest())};
 }
 
 void use(const OctomapData& data) {
@@ -42,7 +43,7 @@ void use(const OctomapData& data) {
                                    .direction_map = Eigen::Vector3d(1.0, 0.5, 0.1),
                                    .max_range_m = 20.0,
                                    .ignore_unknown = true}));
-  const OctomapData again = map.encode(false);
+  const OctomapData again = map.encode(OctomapEncoding::full);
   require(check_octomap(again).fault.empty(), "what is encoded can be read");
 }
 
@@ -73,8 +74,8 @@ std::vector<Seed> seeds() {
   view.tiles = {view.tiles.front()};
   OccupancyMap map{OccupancyConfig{}};
   map.insert(view);
-  const OctomapData binary = map.encode(true);
-  const OctomapData full = map.encode(false);
+  const OctomapData binary = map.encode(OctomapEncoding::binary);
+  const OctomapData full = map.encode(OctomapEncoding::full);
   return {{"message", with_choice(message, to_cdr(wire::to_octomap(binary, 5, "map")))},
           {"bt", with_choice(binary_file, file_bytes("seed.bt", binary))},
           {"ot", with_choice(full_file, file_bytes("seed.ot", full))},
