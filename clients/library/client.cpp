@@ -100,16 +100,16 @@ Client::~Client() = default;
 Client::Client(Client&&) noexcept = default;
 Client& Client::operator=(Client&&) noexcept = default;
 
-void Client::wait_for_server(std::chrono::milliseconds timeout) {
-  std::chrono::milliseconds waited{};
+void Client::wait_for_server(std::chrono::milliseconds timeout, std::chrono::milliseconds waited) {
+  std::chrono::milliseconds connecting{};
   if (connection_->options.dds.transport == dds::NetworkTransport::tcp) {
     // Of the timeout, something is left for the answer of a server that was found.
     const auto since = std::chrono::floor<std::chrono::milliseconds>(
         std::chrono::steady_clock::now() - connection_->connecting_since);
-    waited = std::min(since, timeout / 2);
+    connecting = std::min(since, timeout / 2);
   }
-  static_cast<void>(
-      connection_->call(services::get_status, GetStatus_Request(), timeout - waited, waited));
+  static_cast<void>(connection_->call(services::get_status, GetStatus_Request(),
+                                      timeout - connecting, waited + connecting));
 }
 
 dds::ServerStatus Client::status() {

@@ -160,8 +160,8 @@ class Client {
   Client& operator=(Client&&) noexcept;
 
   /// Returns when a server answers; throws ServiceTimeout after `timeout`, of which over TCP up to
-  /// half may have passed since the client was made.
-  void wait_for_server(std::chrono::milliseconds timeout);
+  /// half may have passed since the client was made. Its text counts what was `waited` before, too.
+  void wait_for_server(std::chrono::milliseconds timeout, std::chrono::milliseconds waited = {});
 
   [[nodiscard]] dds::ServerStatus status();
 

@@ -28,31 +28,23 @@ std::chrono::milliseconds duration_of(double seconds) {
   return std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * seconds));
 }
 
-/// Calls `wait(so long)` until it is true or the time is up; in between Ctrl-C ends it. Waits are
-/// twice as long each time, up to `max_slice`.
+/// Calls `wait(so long, waited before)` until it is true or the time is up; in between Ctrl-C ends
+/// it. Waits are twice as long each time, up to `max_slice`; the last one ends with the time.
 template <typename Wait>
 bool wait_for(double timeout_s, std::chrono::milliseconds max_slice, Wait wait) {
   std::chrono::milliseconds slice(std::min(max_slice, std::chrono::milliseconds(500)));
-  const auto end = std::chrono::steady_clock::now() + duration_of(timeout_s);
+  const std::chrono::milliseconds timeout = duration_of(timeout_s);
+  const auto end = std::chrono::steady_clock::now() + timeout;
   for (;;) {
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
-        end - std::chrono::steady_clock::now());
-    if (wait(std::clamp(left, std::chrono::milliseconds(0), slice))) return true;
+    const auto left = std::max(std::chrono::milliseconds(0),
+                               std::chrono::duration_cast<std::chrono::milliseconds>(
+                                   end - std::chrono::steady_clock::now()));
+    if (wait(std::min(left, slice), timeout - left)) return true;
     if (left <= slice) return false;
     slice = std::min(2 * slice, max_slice);
     const py::gil_scoped_acquire held;
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
   }
-}
-
-/// The text of the last of several waits, with the time of all in place of its own.
-std::string with_whole_wait(std::string fault, std::chrono::milliseconds waited) {
-  const std::string before = " within ";
-  const std::size_t begin = fault.find(before);
-  const std::size_t end = fault.find(" ms", begin);
-  if (end == std::string::npos) return fault;
-  const std::size_t number = begin + before.size();
-  return fault.replace(number, end - number, std::to_string(waited.count()));
 }
 
 std::unique_ptr<Client> connect(std::optional<std::uint32_t> domain, const std::string& server,
@@ -75,19 +67,19 @@ std::unique_ptr<Client> connect(std::optional<std::uint32_t> domain, const std::
   options.dds.domain_id = domain ? *domain : dds::ros_domain_id();
   options.dds.security = security.value_or("");
   auto client = std::make_unique<Client>(options);
-  std::string fault;
+  std::optional<ServiceTimeout> fault;
   // An answer over a slow link takes long.
   constexpr std::chrono::seconds max_slice(10);
-  const bool answers = wait_for(timeout_s, max_slice, [&](std::chrono::milliseconds slice) {
+  const auto answers = [&](std::chrono::milliseconds slice, std::chrono::milliseconds waited) {
     try {
-      client->wait_for_server(slice);
+      client->wait_for_server(slice, waited);
       return true;
     } catch (const ServiceTimeout& timeout) {
-      fault = timeout.what();
+      fault = timeout;
       return false;
     }
-  });
-  if (!answers) throw ServiceTimeout(with_whole_wait(fault, duration_of(timeout_s)));
+  };
+  if (!wait_for(timeout_s, max_slice, answers)) throw *fault;
   return client;
 }
 
@@ -145,11 +137,11 @@ Message newest_of(Subscribe subscribe, double timeout_s, const char* fault) {
     arrived.notify_one();
   });
   constexpr std::chrono::milliseconds max_slice(200);
-  const bool has_come = wait_for(timeout_s, max_slice, [&](std::chrono::milliseconds slice) {
+  const auto has_come = [&](std::chrono::milliseconds slice, std::chrono::milliseconds) {
     std::unique_lock lock(mutex);
     return arrived.wait_for(lock, slice, [&] { return newest.has_value(); });
-  });
-  if (!has_come) throw ServiceTimeout(fault);
+  };
+  if (!wait_for(timeout_s, max_slice, has_come)) throw ServiceTimeout(fault);
   const std::lock_guard lock(mutex);
   return *newest;
 }
