@@ -36,6 +36,7 @@ struct ServiceInfo {
   std::string type;
 };
 
+/// With the numbers that the protocol has for them.
 enum class StatusLevel { info = 0, warning = 1, error = 2 };
 
 // What this side sends.
@@ -62,6 +63,7 @@ using MessageHeader = std::array<std::uint8_t, 13>;
 
 // What clients send.
 
+/// Asks for channels, each under an id that the client chose.
 struct Subscribe {
   struct Wish {
     std::uint32_t id = 0;
@@ -69,9 +71,11 @@ struct Subscribe {
   };
   std::vector<Wish> subscriptions;
 };
+/// By the ids of its subscriptions.
 struct Unsubscribe {
   std::vector<std::uint32_t> ids;
 };
+/// Channels that the client will publish on, by ids of its own.
 struct ClientAdvertise {
   struct Channel {
     std::uint32_t id = 0;
@@ -81,9 +85,11 @@ struct ClientAdvertise {
   };
   std::vector<Channel> channels;
 };
+/// By the ids of its channels.
 struct ClientUnadvertise {
   std::vector<std::uint32_t> ids;
 };
+/// The answer bears this id, and no parameters.
 struct GetParameters {
   std::string id;
 };
@@ -96,6 +102,7 @@ struct ClientMessage {
   std::uint32_t channel = 0;
   std::span<const std::uint8_t> bytes;
 };
+/// `bytes` lie in the message that was parsed.
 struct ServiceCall {
   std::uint32_t service = 0;
   std::uint32_t call = 0;

@@ -75,6 +75,7 @@ struct OdometryUpdate {
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
 };
 
+/// The tiles of a map, without their voxels.
 struct TileVersions {
   dds::MapIdentity map;
   std::vector<TileInfo> tiles;

@@ -75,6 +75,7 @@ struct TrafficLight {
   [[nodiscard]] bool is_red(double time_s) const;
 };
 
+/// A traffic light, so far along a lane.
 struct StopLine {
   double position_m;
   TrafficLight light;
@@ -89,6 +90,7 @@ struct DriverModel {
   double lateral_acceleration_mps2 = 2.0;
 };
 
+/// `start_m` is along the lane.
 struct LaneUser {
   double start_m;
   double length_m;

@@ -19,6 +19,7 @@ namespace stillmap::dds::mcap {
 
 inline constexpr std::string_view magic{"\x89MCAP0\r\n", 8};
 
+/// Kinds of records, with their numbers in a file.
 enum class Opcode : std::uint8_t {
   header = 1,
   footer = 2,
@@ -69,6 +70,7 @@ class FieldReader {
   std::span<const std::uint8_t> left_;
 };
 
+/// The length is that of what follows.
 struct RecordHead {
   Opcode opcode{};
   std::uint64_t length = 0;
@@ -125,6 +127,7 @@ struct MessageIndex {
   std::vector<MessageIndexEntry> entries;
 };
 
+/// Times are log times [ns]; offset and length are in the file.
 struct ChunkIndex {
   std::uint64_t start_ns = 0;
   std::uint64_t end_ns = 0;
@@ -139,6 +142,7 @@ struct ChunkIndex {
   std::uint64_t uncompressed_bytes = 0;
 };
 
+/// Of the whole file. Times are log times [ns].
 struct Statistics {
   std::uint64_t messages = 0;
   std::uint16_t schemas = 0;

@@ -25,6 +25,7 @@ namespace stillmap::wire {
     const std::string& frame, const std::string& child_frame,
     const Eigen::Matrix<double, 6, 1>& velocity = Eigen::Matrix<double, 6, 1>::Zero());
 
+/// The covariance is of (x, y, z, rotation about x, y, z) along the frame's axes [m, rad].
 struct PoseWithCovariance {
   StampedPose pose;
   Eigen::Matrix<double, 6, 6> covariance;

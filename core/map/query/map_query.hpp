@@ -43,6 +43,7 @@ struct QueryVoxel {
   std::uint32_t point_count = 0;
 };
 
+/// What became of a tile since the version that the client knows; numbers are those on the wire.
 enum class TileChangeKind : std::uint8_t {
   /// Was not there at `since`; without `since`, every tile.
   appeared = 0,
@@ -62,6 +63,7 @@ struct TileChange {
   friend bool operator==(const TileChange&, const TileChange&) = default;
 };
 
+/// Numbers are those on the wire.
 enum class QueryStatus : std::uint8_t {
   ok = 0,
   invalid_request = 1,

@@ -28,6 +28,8 @@ class FieldWriter {
   std::uint8_t* to_;
 };
 
+/// Reads fields one after the other, as the machine has them in memory. Checks no end: the caller
+/// knows that they are there.
 class FieldReader {
  public:
   explicit FieldReader(const std::uint8_t* from) : from_(from) {}

@@ -78,6 +78,7 @@ using Step = std::variant<LoadInput, Convert, Convolve, InterleaveRows, Activate
 /// The tensor that a step writes.
 [[nodiscard]] const TensorPlacement& target(const Step& step);
 
+/// Memory that tensors share, one after the other.
 struct Buffer {
   std::size_t bytes = 0;
   /// Lifetime of its content, both steps included.
