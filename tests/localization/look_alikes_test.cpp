@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <memory>
 #include <numbers>
 #include <random>
@@ -45,23 +44,8 @@ class RowOfHouses : public Boxes {
     }
   }
 
-  /// By 32 rings, with noise.
   [[nodiscard]] Scan scan_at(const Eigen::Isometry3d& T_map_lidar, std::int64_t stamp_ns) const {
-    std::mt19937_64 random(static_cast<std::uint64_t>(stamp_ns));
-    std::normal_distribution<double> noise_m(0.0, 0.015);
-    Scan scan;
-    scan.stamp_ns = stamp_ns;
-    for (int ring = 0; ring < 32; ++ring) {
-      const double elevation = (15.0 - ring) * std::numbers::pi / 180.0;
-      for (int k = 0; k < 720; ++k) {
-        const Eigen::Vector3d ray = ray_at(elevation, k * std::numbers::pi / 360.0);
-        const double hit_m = range_m(T_map_lidar.translation(), T_map_lidar.linear() * ray);
-        if (hit_m > 90.0) continue;
-        scan.points_lidar.push_back(((hit_m + noise_m(random)) * ray).cast<float>());
-        scan.ring.push_back(static_cast<std::uint16_t>(ring));
-      }
-    }
-    return scan;
+    return scan_of(*this, T_map_lidar, stamp_ns, 720, 90.0);
   }
 
  private:

@@ -1,31 +1,24 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <memory>
 #include <numbers>
 #include <random>
-#include <vector>
 
 #include "core/localization/localizer.hpp"
+#include "tests/lidar/boxes.hpp"
 #include "tests/localization/driven_map.hpp"
 
 namespace stillmap::test {
 namespace {
 
-constexpr double rad_per_degree = std::numbers::pi / 180.0;
 constexpr double street_length_m = 130.0;
 constexpr double front_height_m = 12.0;
 constexpr double height_in_street_m = 1.9;
 
-struct House {
-  Eigen::Vector3d low, high;
-};
-
 /// A street between smooth fronts, which poles and the gaps between houses alone tell the way
 /// along; or without those, which nothing does.
-class SmoothStreet {
+class SmoothStreet : public Boxes {
  public:
   explicit SmoothStreet(bool is_bare) {
     add({-30.0, -30.0, -1.0}, {street_length_m + 30.0, 30.0, 0.0});
@@ -49,44 +42,9 @@ class SmoothStreet {
     }
   }
 
-  /// By 32 rings a degree apart, with noise.
   [[nodiscard]] Scan scan_at(const Eigen::Isometry3d& T_map_lidar, std::int64_t stamp_ns) const {
-    std::mt19937_64 random(static_cast<std::uint64_t>(stamp_ns));
-    std::normal_distribution<double> noise_m(0.0, 0.015);
-    Scan scan;
-    scan.stamp_ns = stamp_ns;
-    for (int ring = 0; ring < 32; ++ring) {
-      const double elevation = (15.0 - ring) * rad_per_degree;
-      for (int k = 0; k < 900; ++k) {
-        const double azimuth = 0.4 * k * rad_per_degree;
-        const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
-                                  std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
-        const double range_m = range(T_map_lidar.translation(), T_map_lidar.linear() * ray);
-        if (range_m > 100.0) continue;
-        scan.points_lidar.push_back(((range_m + noise_m(random)) * ray).cast<float>());
-        scan.ring.push_back(static_cast<std::uint16_t>(ring));
-      }
-    }
-    return scan;
+    return scan_of(*this, T_map_lidar, stamp_ns, 900, 100.0);
   }
-
- private:
-  void add(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
-    houses_.push_back({low, high});
-  }
-  [[nodiscard]] double range(const Eigen::Vector3d& from, const Eigen::Vector3d& ray) const {
-    double nearest = std::numeric_limits<double>::infinity();
-    for (const House& house : houses_) {
-      const Eigen::Array3d a = (house.low - from).array() / ray.array();
-      const Eigen::Array3d b = (house.high - from).array() / ray.array();
-      const double enter = a.min(b).maxCoeff();
-      const double leave = a.max(b).minCoeff();
-      if (enter > 0.0 && enter < leave) nearest = std::min(nearest, enter);
-    }
-    return nearest;
-  }
-
-  std::vector<House> houses_;
 };
 
 Eigen::Isometry3d pose_in_street(double x, double y, double heading_rad) {
