@@ -251,6 +251,11 @@ void read_input(YamlSection section, InputConfig& input) {
   section.choice<LabelKind>(
       "label_kind", input.label_kind,
       {{"semantic_kitti", LabelKind::semantic_kitti}, {"classes", LabelKind::classes}});
+  double clouds_per_turn = TurnJoiner::automatic;
+  section.number_or("auto", "clouds_per_turn", clouds_per_turn, {1, TurnJoiner::most});
+  input.clouds_per_turn = static_cast<std::uint32_t>(clouds_per_turn);
+  if (clouds_per_turn != std::floor(clouds_per_turn))
+    section.fault("clouds_per_turn", "is no whole number");
 }
 
 void read_publish(YamlSection section, PublishConfig& publish) {

@@ -13,6 +13,7 @@
 #include "core/lidar/label_kind.hpp"
 #include "core/lidar/point_fields.hpp"
 #include "core/lidar/sensor_model.hpp"
+#include "core/lidar/turn_joiner.hpp"
 #include "core/mapper.hpp"
 #include "core/occupancy/occupancy_config.hpp"
 #include "core/segmentation/open_network.hpp"
@@ -138,6 +139,9 @@ struct InputConfig {
   double sweep_wait_s = 0.1;
   PointFieldNames fields;
   LabelKind label_kind = LabelKind::semantic_kitti;
+  /// So many clouds that follow each other are a turn of the lidar, and one scan;
+  /// TurnJoiner::automatic: they tell.
+  std::uint32_t clouds_per_turn = TurnJoiner::automatic;
 };
 
 struct PublishConfig {

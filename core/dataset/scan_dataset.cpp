@@ -39,10 +39,11 @@ std::optional<std::vector<std::int64_t>> stamps_from_names(const std::vector<fs:
   return stamps_ns;
 }
 
-std::vector<std::int64_t> made_up_stamps(std::size_t scans) {
+std::vector<std::int64_t> made_up_stamps(std::size_t scans,
+                                         std::int64_t period_ns = default_period_ns) {
   std::vector<std::int64_t> stamps_ns;
   for (std::size_t i = 0; i < scans; ++i) {
-    stamps_ns.push_back(static_cast<std::int64_t>(i) * default_period_ns);
+    stamps_ns.push_back(static_cast<std::int64_t>(i) * period_ns);
   }
   return stamps_ns;
 }
@@ -165,6 +166,9 @@ BinLayout ScanDataset::find_bin_layout() const {
 }
 
 void ScanDataset::learn_from_sample() {
+  label_census_ = {};
+  has_labels_ = lacks_labels_ = false;
+  kitti_lidar_.reset();
   // The first scan of a recording is often part of one, and any may be damaged.
   std::vector<std::pair<std::size_t, std::size_t>> readable;
   std::vector<float> full_scales;
@@ -226,9 +230,48 @@ double ScanDataset::period_s() const {
   return median_s > 0.5 * usual_s && median_s < 1.5 * usual_s ? median_s : usual_s;
 }
 
-fs::path ScanDataset::beside(std::size_t i, const char* folder, const char* extension) const {
+std::size_t ScanDataset::find_clouds_per_turn() const {
+  constexpr std::size_t places = 5, max_clouds = 200;
+  std::vector<std::size_t> found;
+  for (std::size_t k = 0; k < places; ++k) {
+    const std::size_t first = files_.size() * k / places;
+    TurnRecognition recognition;
+    const std::size_t end = std::min(files_.size(), first + max_clouds);
+    for (std::size_t part = first; part < end && recognition.clouds_per_turn() == 0; ++part) {
+      try {
+        const Scan cloud = read_part(part).scan;
+        recognition.learn({.stamp_ns = cloud.stamp_ns, .arc = viewed_arc(cloud.points_lidar)});
+      } catch (const DatasetError&) {
+        // Whoever reads that scan is told.
+        recognition = {};
+      }
+    }
+    if (recognition.clouds_per_turn() > 0) found.push_back(recognition.clouds_per_turn());
+  }
+  if (found.empty()) return 1;
+  const auto middle = found.begin() + static_cast<std::ptrdiff_t>(found.size() / 2);
+  std::ranges::nth_element(found, middle);
+  return *middle;
+}
+
+void ScanDataset::join_turns(std::size_t clouds_per_turn) {
+  if (source_ && !source_->is_of_one_frame()) return;
+  if (clouds_per_turn == TurnJoiner::automatic) clouds_per_turn = find_clouds_per_turn();
+  if (clouds_per_turn == clouds_per_turn_) return;
+  clouds_per_turn_ = clouds_per_turn;
+  turns_.clear();
+  if (times_unit_ == TimesUnit::none)
+    stamps_ns_ = made_up_stamps(files_.size(),
+                                default_period_ns / static_cast<std::int64_t>(clouds_per_turn));
+  TurnCounter counter(clouds_per_turn);
+  for (std::size_t part = 0; part < files_.size(); ++part)
+    if (counter.begins_turn(stamps_ns_[part])) turns_.push_back(part);
+  learn_from_sample();
+}
+
+fs::path ScanDataset::beside(std::size_t part, const char* folder, const char* extension) const {
   if (sequence_.empty()) return {};
-  return sequence_ / folder / (file(i).stem().string() + extension);
+  return sequence_ / folder / (files_.at(part).stem().string() + extension);
 }
 
 std::string ScanDataset::remark_on_times() const {
@@ -258,6 +301,12 @@ std::vector<std::string> ScanDataset::remarks(bool is_mount_known) const {
   std::vector<std::string> remarks;
   if (!format_.empty()) remarks.push_back("points have " + format_);
   if (const std::string remark = remark_on_times(); !remark.empty()) remarks.push_back(remark);
+  if (clouds_per_turn_ > 1)
+    remarks.push_back(std::to_string(clouds_per_turn_) +
+                      " clouds after another are joined to a scan, as parts of a turn: " +
+                      std::to_string(files_.size()) + " clouds, " + std::to_string(size()) +
+                      " scans ('input: {clouds_per_turn: 1}' in a --config file leaves each a "
+                      "scan)");
   if (are_axes_ours_)
     remarks.push_back(std::string(axes_file_name) +
                       " says that its points are x ahead, y left and z up already: the names of "
@@ -279,9 +328,9 @@ std::vector<fs::path> ScanDataset::all_files() const {
     std::error_code error;
     if (!file.empty() && fs::is_regular_file(file, error)) files.push_back(file);
   };
-  for (std::size_t i = 0; i < size(); ++i) {
-    add(beside(i, "labels", ".label"));
-    for (const char* folder : {"time_offsets", "rings"}) add(beside(i, folder, ".bin"));
+  for (std::size_t part = 0; part < files_.size(); ++part) {
+    add(beside(part, "labels", ".label"));
+    for (const char* folder : {"time_offsets", "rings"}) add(beside(part, folder, ".bin"));
   }
   for (const char* part : sequence_parts)
     add((sequence_.empty() ? files_.front().parent_path() : sequence_) / part);
@@ -289,8 +338,10 @@ std::vector<fs::path> ScanDataset::all_files() const {
 }
 
 bool ScanDataset::has_labels(std::size_t i) const {
-  return ending_of(file(i)) == ".bin" ? fs::exists(beside(i, "labels", ".label"))
-                                      : !read(i).raw_labels.empty();
+  if (ending_of(file(i)) != ".bin") return !read(i).raw_labels.empty();
+  for (std::size_t part = first_part(i); part < end_of_parts(i); ++part)
+    if (!fs::exists(beside(part, "labels", ".label"))) return false;
+  return true;
 }
 
 bool ScanDataset::lacks_labels() const {
@@ -309,13 +360,35 @@ DatasetFrame ScanDataset::read_unscaled(std::size_t i) const {
 }
 
 DatasetFrame ScanDataset::read_as_recorded(std::size_t i) const {
-  if (source_) return source_->read(i);
-  if (ending_of(file(i)) != ".bin") {
-    auto [scan, raw_labels, format] = read_point_cloud(file(i), stamp_ns(i), fields_);
+  if (turns_.empty()) return read_part(i);
+  DatasetFrame joined;
+  std::vector<Scan> parts;
+  std::vector<std::vector<std::uint32_t>> raw_labels;
+  bool is_labelled = false;
+  for (std::size_t part = first_part(i); part < end_of_parts(i); ++part) {
+    DatasetFrame frame = read_part(part);
+    is_labelled |= !frame.raw_labels.empty();
+    frame.raw_labels.resize(frame.scan.size());
+    raw_labels.push_back(std::move(frame.raw_labels));
+    parts.push_back(std::move(frame.scan));
+    joined.format = std::move(frame.format);
+  }
+  joined.scan = joined_turn(std::move(parts));
+  if (!is_labelled) return joined;
+  for (const auto& labels : raw_labels)
+    joined.raw_labels.insert(joined.raw_labels.end(), labels.begin(), labels.end());
+  return joined;
+}
+
+DatasetFrame ScanDataset::read_part(std::size_t part) const {
+  if (source_) return source_->read(part);
+  if (ending_of(files_.at(part)) != ".bin") {
+    auto [scan, raw_labels, format] =
+        read_point_cloud(files_.at(part), stamps_ns_.at(part), fields_);
     return {std::move(scan), std::move(raw_labels), std::move(format)};
   }
   DatasetFrame frame;
-  frame.scan = read_bin(file(i), bin_layout_);
+  frame.scan = read_bin(files_.at(part), bin_layout_);
   if (const Eigen::Matrix3f axes = axes_by(fields_); !axes.isIdentity(0.0F)) {
     for (Eigen::Vector3f& p : frame.scan.points_lidar) p = axes * p;
     frame.format = axes_in_words(fields_) + "intensity";
@@ -323,13 +396,13 @@ DatasetFrame ScanDataset::read_as_recorded(std::size_t i) const {
   if (bin_layout_ == BinLayout::nuscenes)
     frame.format = axes_in_words(fields_) +
                    "intensity (0 to 255) and ring as nuScenes' files have them, no time";
-  frame.scan.stamp_ns = stamp_ns(i);
+  frame.scan.stamp_ns = stamps_ns_.at(part);
   const std::size_t points = frame.scan.size();
-  if (const auto labels = beside(i, "labels", ".label"); fs::exists(labels)) {
+  if (const auto labels = beside(part, "labels", ".label"); fs::exists(labels)) {
     frame.raw_labels = read_kitti_labels(labels, points);
   }
   const auto side_file = [&]<class T>(const char* folder, std::vector<T>& values) {
-    const fs::path side = beside(i, folder, ".bin");
+    const fs::path side = beside(part, folder, ".bin");
     if (!fs::exists(side)) return;
     values = read_values<T>(side);
     if (values.size() == points) return;
@@ -393,8 +466,8 @@ std::optional<Trajectory> ScanDataset::truth() const {
     for (Eigen::Isometry3d& T : T_map_lidar) T = about_other_axes(T, axes);
   Trajectory trajectory;
   const auto lines = lines_in(pose_file, lines_, T_map_lidar.size(), files_);
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    trajectory.push_back({stamp_ns(i), T_map_lidar[lines[i]]});
+  for (std::size_t i = 0; i < size(); ++i) {
+    trajectory.push_back({stamp_ns(i), T_map_lidar[lines[first_part(i)]]});
   }
   return trajectory;
 }

@@ -17,6 +17,7 @@
 #include "core/lidar/scan.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/lidar/trajectory.hpp"
+#include "core/lidar/turn_joiner.hpp"
 
 namespace stillmap {
 
@@ -46,8 +47,19 @@ class ScanDataset {
   explicit ScanDataset(std::shared_ptr<const ScanSource> source,
                        std::optional<LabelKind> label_kind = {});
 
-  [[nodiscard]] std::size_t size() const { return files_.size(); }
-  [[nodiscard]] const std::filesystem::path& file(std::size_t i) const { return files_.at(i); }
+  /// Makes a scan of the clouds of each turn where these are parts of turns: `clouds_per_turn` of
+  /// them, unless some were lost by the stamps; 1 leaves each a scan, TurnJoiner::automatic finds
+  /// out from clouds of five places. Those of several frames stay as they are. Scans then have
+  /// other numbers. Without stamps ten turns a second are assumed.
+  void join_turns(std::size_t clouds_per_turn = TurnJoiner::automatic);
+  /// 1: each cloud is a scan.
+  [[nodiscard]] std::size_t clouds_per_turn() const { return clouds_per_turn_; }
+
+  [[nodiscard]] std::size_t size() const { return turns_.empty() ? files_.size() : turns_.size(); }
+  /// Of a joined turn: that of the first part.
+  [[nodiscard]] const std::filesystem::path& file(std::size_t i) const {
+    return files_.at(first_part(i));
+  }
 
   /// What was understood or taken for granted, in words: from which fields of a typical scan its
   /// intensity, times and rings are; that files without a stamp in their names follow each other
@@ -61,7 +73,7 @@ class ScanDataset {
 
   /// From times.txt (see read_kitti_times()), else from the files' names (see
   /// stamp_ns_from_name()), else 0.1 s apart from 0.
-  [[nodiscard]] std::int64_t stamp_ns(std::size_t i) const { return stamps_ns_.at(i); }
+  [[nodiscard]] std::int64_t stamp_ns(std::size_t i) const { return stamps_ns_.at(first_part(i)); }
 
   /// Whether scans come with labels: any of some from all over the dataset that can be read. Labels
   /// without one known class, as where PCL's PointXYZL was saved unfilled, are none.
@@ -101,10 +113,22 @@ class ScanDataset {
   [[nodiscard]] const std::optional<KittiLidar>& kitti_lidar() const { return kitti_lidar_; }
 
  private:
+  [[nodiscard]] std::size_t first_part(std::size_t i) const {
+    return turns_.empty() ? i : turns_.at(i);
+  }
+  /// One after the last.
+  [[nodiscard]] std::size_t end_of_parts(std::size_t i) const {
+    return i + 1 < size() ? first_part(i + 1) : files_.size();
+  }
+  /// How many clouds make a turn, by those of some places.
+  [[nodiscard]] std::size_t find_clouds_per_turn() const;
+
   [[nodiscard]] DatasetFrame read_unscaled(std::size_t i) const;
-  /// With raw labels as they are in the file or message.
+  /// With raw labels as they are in the files or messages.
   [[nodiscard]] DatasetFrame read_as_recorded(std::size_t i) const;
-  [[nodiscard]] std::filesystem::path beside(std::size_t i, const char* folder,
+  /// Of the files or messages, not of the scans.
+  [[nodiscard]] DatasetFrame read_part(std::size_t part) const;
+  [[nodiscard]] std::filesystem::path beside(std::size_t part, const char* folder,
                                              const char* extension) const;
 
   /// A few scans from all over the dataset.
@@ -129,6 +153,9 @@ class ScanDataset {
   /// Line of each scan in times.txt and the pose files.
   std::vector<std::size_t> lines_;
   std::vector<std::int64_t> stamps_ns_;
+  /// Of each scan the first of its files; empty where each is one.
+  std::vector<std::size_t> turns_;
+  std::size_t clouds_per_turn_ = 1;
   std::optional<LabelKind> label_kind_;
   PointFieldNames fields_;
   /// Of a typical scan.

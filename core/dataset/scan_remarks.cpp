@@ -199,9 +199,9 @@ std::vector<std::string> remarks_on_scans(const ScanDataset& dataset, bool is_mo
   if (parts == pairs)
     remarks.push_back(
         "scans that follow each other look into other directions, as parts of one turn, or as "
-        "several lidars on one topic: of half turns every second scan is lost, and poses may be "
-        "metres off; let the lidar turn once a scan (CARLA: rotation_frequency = 1 / "
-        "fixed_delta_seconds), or join the parts");
+        "several lidars on one topic: parts are joined by 'stillmap map' and by a server "
+        "(input.clouds_per_turn); of half turns that are left as they are every second one is "
+        "lost, and poses may be metres off");
   if (up)
     remarks.push_back(
         "by the ground that these points seem to show, unless that is a ceiling or "

@@ -44,6 +44,8 @@ class ScanSource {
   [[nodiscard]] virtual DatasetFrame read(std::size_t i) const = 0;
   /// Nothing where the source does not tell which sensor it was.
   [[nodiscard]] virtual std::optional<SensorModel> sensor() const = 0;
+  /// Whether all scans are of one frame, so that parts of a turn may be joined.
+  [[nodiscard]] virtual bool is_of_one_frame() const { return true; }
   /// Samples of the IMU that was recorded beside the scans, in the order of the recording; empty
   /// without one.
   [[nodiscard]] virtual std::vector<ImuSample> imu() const { return {}; }

@@ -29,6 +29,7 @@ class BagScanSource final : public ScanSource {
   [[nodiscard]] std::int64_t stamp_ns(std::size_t i) const override { return stamps_ns_.at(i); }
   [[nodiscard]] DatasetFrame read(std::size_t i) const override;
   [[nodiscard]] std::optional<SensorModel> sensor() const override { return sensor_; }
+  [[nodiscard]] bool is_of_one_frame() const override { return frames_.size() < 2; }
   /// Of the bag's only topic of sensor_msgs/msg/Imu; nothing where there are several. Messages that
   /// are damaged are left out.
   [[nodiscard]] std::vector<ImuSample> imu() const override;

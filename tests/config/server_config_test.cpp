@@ -89,6 +89,17 @@ TEST(ServerConfig, ReadsTheAxesOfPoints) {
   EXPECT_THAT(refusal_of("input: {fields: {y: []}}"), HasSubstr("no two of them the same"));
 }
 
+TEST(ServerConfig, ReadsHowManyCloudsAreATurn) {
+  const auto clouds_per_turn = [](const std::string& value) {
+    return load("input: {clouds_per_turn: " + value + "}").input.clouds_per_turn;
+  };
+  EXPECT_EQ(clouds_per_turn("auto"), TurnJoiner::automatic);
+  EXPECT_EQ(clouds_per_turn("1"), 1U);
+  EXPECT_EQ(clouds_per_turn("4"), 4U);
+  EXPECT_THAT(refusal_of("input: {clouds_per_turn: 2.5}"), HasSubstr("no whole number"));
+  EXPECT_THAT(refusal_of("input: {clouds_per_turn: 0}"), HasSubstr("'auto', or a number"));
+}
+
 TEST(ServerConfig, ReadsWhereTheLidarSits) {
   const ServerConfig config = load(
       "frames: {base: base_link, odom: odom}\n"

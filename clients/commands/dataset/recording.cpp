@@ -11,9 +11,11 @@ namespace stillmap::cli {
 namespace {
 
 dds::Recording opened(const std::string& path, const std::string& topic,
-                      std::optional<LabelKind> label_kind, const PointFieldNames& fields = {},
-                      bool is_mount_known = false) {
+                      std::optional<LabelKind> label_kind,
+                      std::size_t clouds_per_turn = TurnJoiner::automatic,
+                      const PointFieldNames& fields = {}, bool is_mount_known = false) {
   dds::Recording recording = dds::open_recording(path, topic, label_kind, fields);
+  recording.dataset.join_turns(clouds_per_turn);
   for (const auto& sentences : {recording.faults, recording.dataset.remarks(is_mount_known)})
     for (const std::string& sentence : sentences) std::cerr << "stillmap: " << sentence << "\n";
   return recording;
@@ -49,6 +51,9 @@ void add_recording_options(CommandHandle command, RecordingArguments& recording)
               "What the numbers in its labels are: semantic_kitti (original ids), classes (0 to "
               "19); default: as in --config, else semantic_kitti if they look like it")
       .one_of({"semantic_kitti", "classes"});
+  command.option("--clouds-per-turn", recording.clouds_per_turn,
+                 "So many clouds that follow each other are a turn of the lidar, and one scan; 1: "
+                 "each is a scan, 0: found out; default: as in --config, else 0");
 }
 
 ScanDataset open_recording(const std::string& path, const std::string& topic) {
@@ -63,6 +68,7 @@ dds::Recording open_recording(const std::string& path, const RecordingArguments&
   const bool is_mount_known =
       is_mount_given || !server.frames.base.empty() || !server.lidars.empty();
   dds::Recording found = opened(path, recording.topic_in, label_kind_of(recording, input),
+                                recording.clouds_per_turn.value_or(input.clouds_per_turn),
                                 input.fields, is_mount_known);
   if (is_strict && !found.lost_parts.empty()) {
     throw DatasetError(

@@ -308,6 +308,8 @@ RunIdentity run_identity(const MapArguments& arguments, const MappingTask& task,
            << (task.earlier_map == nullptr ? "" : ", onto " + task.earlier_map->identity());
   const std::string& label_kind = arguments.recording.label_kind;
   if (!label_kind.empty()) settings << ", label kind " << label_kind;
+  if (const std::size_t clouds = task.dataset.clouds_per_turn(); clouds > 1)
+    settings << ", turns of " << clouds << " clouds";
   for (const double metres : arguments.antenna) settings << ", antenna " << metres;
   for (const std::string& denied : arguments.denied_loops) settings << ", not " << denied;
   if (!arguments.mapper.config_file.empty())
