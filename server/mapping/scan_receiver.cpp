@@ -182,7 +182,8 @@ ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& co
             .sensor = config.mapper.sensor,
             .reader = wire::CloudReader(reading_of(config, config.mapper.sensor)),
             .recognition = config.automatic_sensor.is_on ? std::make_optional<SensorRecognition>()
-                                                         : std::nullopt}},
+                                                         : std::nullopt,
+            .turns = TurnJoiner(config.input.clouds_per_turn)}},
           nullptr, queue, statistics) {}
 
 ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& config,
@@ -197,6 +198,7 @@ ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& co
     : topic_(points_of(config, ros_topic).dds_name),
       participant_(participant),
       delivery_(config.input.delivery),
+      clouds_per_turn_(config.input.clouds_per_turn),
       lidars_(std::move(lidars)),
       sweeps_(sweeps),
       queue_(queue),
@@ -210,9 +212,10 @@ ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& co
                 if (came) {
                   count_losses(info.sample_identity);
                   accept(cloud, stop);
-                } else if (sweeps_ != nullptr) {
-                  sweeps_->queue_overdue(stop);
+                  return;
                 }
+                for (Lidar& lidar : lidars_) end_turn(lidar, stop);
+                if (sweeps_ != nullptr) sweeps_->queue_overdue(stop);
               }) {}
 
 std::vector<ScanReceiver::Lidar> ScanReceiver::lidars_on(const ServerConfig& config,
@@ -225,7 +228,8 @@ std::vector<ScanReceiver::Lidar> ScanReceiver::lidars_on(const ServerConfig& con
                       .name = lidar.name,
                       .frame = lidar.frame,
                       .sensor = lidar.sensor,
-                      .reader = wire::CloudReader(reading_of(config, lidar.sensor))});
+                      .reader = wire::CloudReader(reading_of(config, lidar.sensor)),
+                      .turns = TurnJoiner(config.input.clouds_per_turn)});
   }
   return lidars;
 }
@@ -272,10 +276,8 @@ void ScanReceiver::drop_unreadable() {
 }
 
 void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std::stop_token& stop) {
-  const auto received = std::chrono::steady_clock::now();
   has_received_ = true;
   const std::string& frame = cloud.header().frame_id();
-  if (sweeps_ == nullptr) statistics_.scan_received();
   statistics_.record_scan_header(frame, seconds_since(cloud.header().stamp()));
   Lidar* const lidar = lidar_of(frame);
   if (lidar == nullptr) {
@@ -286,17 +288,50 @@ void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std:
   auto [from_cloud, cloud_changes] = lidar->reader.read(cloud);
   auto& scan = from_cloud.scan;
   if (!scan) {
+    if (sweeps_ == nullptr) statistics_.scan_received();
     statistics_.bad_cloud(from_cloud.fault.counter);
     return drop("bad_cloud", 1, "bad cloud: " + from_cloud.fault.reason);
   }
-  lidar->frame_read = frame;
   report_labels(*lidar, from_cloud.label_census);
-  report(*lidar, cloud_changes, *scan);
-  report_frame(*lidar);
-  if (sweeps_ != nullptr) return sweeps_->add(lidar->index, *std::move(scan), stop);
-  queue_scan({*std::move(scan), frame, received,
-              lidar->recognition ? lidar->recognition->sensor() : nullptr},
-             stop);
+  report_layout(*lidar, cloud_changes);
+  take(*lidar, *std::move(scan), frame, stop);
+}
+
+void ScanReceiver::take(Lidar& lidar, Scan cloud, const std::string& frame,
+                        const std::stop_token& stop) {
+  if (lidar.frame_read != frame) {
+    // Of another lidar, or of one that was moved: no parts of the same turn.
+    end_turn(lidar, stop);
+    lidar.turns = TurnJoiner(clouds_per_turn_);
+    lidar.frame_read = frame;
+  }
+  const std::size_t before = lidar.turns.clouds_per_turn();
+  std::vector<Scan> scans = lidar.turns.add(std::move(cloud));
+  const std::size_t now = lidar.turns.clouds_per_turn();
+  if (now != before && now > 1)
+    spdlog::info("clouds on {} are parts of turns: {} of them are a scan ({})", topic_, now,
+                 "input.clouds_per_turn: 1 leaves each a scan");
+  pass_on(lidar, std::move(scans), stop);
+}
+
+void ScanReceiver::end_turn(Lidar& lidar, const std::stop_token& stop) {
+  pass_on(lidar, lidar.turns.flush(), stop);
+}
+
+void ScanReceiver::pass_on(Lidar& lidar, std::vector<Scan> scans, const std::stop_token& stop) {
+  const auto received = std::chrono::steady_clock::now();
+  for (Scan& scan : scans) {
+    report(lidar, scan);
+    report_frame(lidar);
+    if (sweeps_ != nullptr) {
+      sweeps_->add(lidar.index, std::move(scan), stop);
+      continue;
+    }
+    statistics_.scan_received();
+    queue_scan({std::move(scan), lidar.frame_read, received,
+                lidar.recognition ? lidar.recognition->sensor() : nullptr},
+               stop);
+  }
 }
 
 void ScanReceiver::queue_scan(QueuedScan queued, const std::stop_token& stop) {
@@ -328,10 +363,15 @@ void ScanReceiver::report_labels(const Lidar& lidar, const LabelCensus& census) 
       are_classes ? "'input.label_kind: classes' where 1 is car and 9 road, or " : "", counter);
 }
 
-void ScanReceiver::report(Lidar& lidar, const std::string& cloud_changes, const Scan& scan) {
+void ScanReceiver::report_layout(Lidar& lidar, const std::string& cloud_changes) {
   // Of two publishers in turn, say, every cloud is another than the last.
-  const bool is_new = !cloud_changes.empty() && layouts_.add(lidar.name + cloud_changes);
-  if (is_new) spdlog::info("clouds on {}: {}", topic_, cloud_changes);
+  if (cloud_changes.empty() || !layouts_.add(lidar.name + cloud_changes)) return;
+  lidar.is_layout_new = true;
+  spdlog::info("clouds on {}: {}", topic_, cloud_changes);
+}
+
+void ScanReceiver::report(Lidar& lidar, const Scan& scan) {
+  const bool is_new = std::exchange(lidar.is_layout_new, false);
   const bool due = lidar.scans_read++ % scans_between_checks == 0;
   const bool is_unknown = lidar.recognition && !lidar.recognition->sensor();
   if (!due && !is_new && !is_unknown) return;

@@ -13,6 +13,7 @@
 #include "core/lidar/sensor_fit.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/lidar/sweep_merger.hpp"
+#include "core/lidar/turn_joiner.hpp"
 #include "idl/conversions/cloud_to_scan.hpp"
 #include "idl/dds/reader.hpp"
 #include "idl/dds/sample_losses.hpp"
@@ -98,6 +99,9 @@ class ScanReceiver {
     /// Of the last cloud, and of the one that told the lidar.
     std::string frame_read{};
     std::string frame_told{};
+    TurnJoiner turns;
+    /// Since the last scan.
+    bool is_layout_new = false;
   };
 
   ScanReceiver(dds::Participant& participant, const ServerConfig& config,
@@ -115,8 +119,15 @@ class ScanReceiver {
   void report_labels(const Lidar& lidar, const LabelCensus& census);
   /// Counts clouds of another frame than that of those which told the lidar.
   void report_frame(const Lidar& lidar);
-  /// Logs changes of the cloud's layout, and now and then checks that scans fit the sensor model.
-  void report(Lidar& lidar, const std::string& cloud_changes, const Scan& scan);
+  /// Logs changes of the cloud's layout.
+  void report_layout(Lidar& lidar, const std::string& cloud_changes);
+  /// Now and then checks that scans fit the sensor model.
+  void report(Lidar& lidar, const Scan& scan);
+  /// Joins clouds that are parts of a turn.
+  void take(Lidar& lidar, Scan cloud, const std::string& frame, const std::stop_token& stop);
+  /// What waits for other parts of its turn, which do not come.
+  void end_turn(Lidar& lidar, const std::stop_token& stop);
+  void pass_on(Lidar& lidar, std::vector<Scan> scans, const std::stop_token& stop);
   /// By the scan, where it tells the lidar. Of two on one topic, none tells what the other is.
   static void recognise(Lidar& lidar, const Scan& scan);
   void queue_scan(QueuedScan queued, const std::stop_token& stop);
@@ -125,6 +136,7 @@ class ScanReceiver {
   std::string topic_;
   const dds::Participant& participant_;
   DeliveryMode delivery_;
+  std::uint32_t clouds_per_turn_;
   std::vector<Lidar> lidars_;
   /// Null: one lidar.
   SweepInput* sweeps_;

@@ -61,9 +61,11 @@ INSTANTIATE_TEST_SUITE_P(
         PublisherCase{"BestEffortToEvery", "every", {.reliable = false, .depth = 5}, false}),
     [](const auto& info) { return std::string(info.param.name); });
 
-/// The poses that come back for the first scans of the room, when `change` was done to each.
+/// The poses that come back for the first scans of the room, when `change` was done to each, and
+/// `clouds_per_pose` of them have a pose.
 template <typename Change>
-std::map<std::int64_t, Eigen::Isometry3d> poses_with(Change change, int scans) {
+std::map<std::int64_t, Eigen::Isometry3d> poses_with(Change change, int scans,
+                                                     int clouds_per_pose = 1) {
   const ServiceSetup setup("every");
   const ServerProcess server(setup.server_arguments());
   Client client(setup.client());
@@ -83,7 +85,7 @@ std::map<std::int64_t, Eigen::Isometry3d> poses_with(Change change, int scans) {
   }
   EXPECT_TRUE(eventually([&] {
     const std::scoped_lock lock(mutex);
-    return poses.size() >= static_cast<std::size_t>(scans);
+    return poses.size() >= static_cast<std::size_t>(scans / clouds_per_pose);
   }));
   const std::scoped_lock lock(mutex);
   return poses;
@@ -106,6 +108,32 @@ TEST(ScanWithoutRings, IsMappedByTheElevationOfItsPoints) {
     const auto pose = poses.find(truth.stamp_ns);
     ASSERT_NE(pose, poses.end()) << i;
     EXPECT_LT((pose->second.translation() - truth.T_map_lidar.translation()).norm(), 0.1) << i;
+  }
+}
+
+// A simulator that ticks twice a turn of its lidar: each cloud is what one half shows at its tick.
+TEST(HalfTurns, AreMappedAsWholeOnes) {
+  constexpr int clouds = 24;
+  int tick = 0;
+  const auto poses = poses_with(
+      [&](Scan& scan) {
+        const bool is_left = tick++ % 2 == 0;
+        Scan half;
+        half.stamp_ns = scan.stamp_ns;
+        for (std::size_t k = 0; k < scan.size(); ++k) {
+          if ((scan.points_lidar[k].y() >= 0.0F) != is_left) continue;
+          half.points_lidar.push_back(scan.points_lidar[k]);
+          half.ring.push_back(scan.ring[k]);
+        }
+        scan = std::move(half);
+      },
+      clouds, 2);
+  EXPECT_EQ(poses.size(), clouds / 2);
+  for (int i = 0; i < clouds; i += 2) {
+    const StampedPose truth = room_pose(i);
+    const auto pose = poses.find(truth.stamp_ns);
+    ASSERT_NE(pose, poses.end()) << i;
+    EXPECT_LT((pose->second.translation() - truth.T_map_lidar.translation()).norm(), 0.05) << i;
   }
 }
 
