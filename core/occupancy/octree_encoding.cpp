@@ -160,7 +160,8 @@ std::string encode_octree(const OcTree& octree, OctomapEncoding encoding,
   pieces.reserve(found.parts.size());
   for (const OctreePart& part : found.parts) {
     if (pause) pause();
-    Assembly::Piece& piece = pieces.emplace_back(part);
+    Assembly::Piece& piece =
+        pieces.emplace_back(Assembly::Piece{.part = part, .node = {}, .bytes = {}});
     if (const OcTreeNode* const node = node_of(octree, part); node != nullptr)
       piece.node = writer.write(*node, piece.bytes);
   }
