@@ -4,10 +4,12 @@
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <numbers>
+#include <numeric>
 
 namespace stillmap {
 namespace {
@@ -78,6 +80,20 @@ constexpr float max_depth_m = 0.3F;
 /// vehicle far away that one beam alone hit, passed below it [m].
 constexpr float min_drop_m = 0.2F;
 
+/// Gaps of more columns between two returns of a row are no steps from shot to shot, and of fewer
+/// gaps nothing is told.
+constexpr int max_gap_columns = 16;
+constexpr int min_gaps = 500;
+/// With more columns than this from one shot to the next the image has fewer, ...
+constexpr float max_columns_a_shot = 1.1F;
+/// ... so that each has a shot, though these do not keep step with columns exactly.
+constexpr float shots_a_column = 1.1F;
+constexpr int min_columns = 32;
+
+/// A surface goes on while its range changes by no more than this times the way across the ray
+/// between two beams: 76 degrees from facing the lidar.
+constexpr float max_slope = 4.0F;
+
 /// How far below the top of its row, in 256ths of it. The outermost beams may lie beyond.
 std::uint8_t share_of_row(float row, float top) {
   return static_cast<std::uint8_t>(std::clamp(256.0F * (row - top), 0.0F, 255.0F));
@@ -97,6 +113,22 @@ RangeImageView::RangeImageView(const Scan& scan, std::span<const SemanticClass> 
       below_row_top_(pixels_.size()) {
   move_to(T_map_lidar);
   std::vector<Return> returns(scan.size());
+  measure(scan, labels, returns);
+  // A lidar that fires less often than it has columns leaves pixels empty between its shots.
+  if (const float between = columns_a_shot(); between > max_columns_a_shot) {
+    columns_ = std::max(
+        min_columns, static_cast<int>(static_cast<float>(columns_) / (between * shots_a_column)));
+    // A shot may be anywhere in its column: one more is asked to either side.
+    columns_beside_ = columns_for_half_a_row(rows_per_rad_, columns_) + 1;
+    pixels_.assign(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(columns_), 0.0F);
+    below_row_top_.assign(pixels_.size(), 0);
+    measure(scan, labels, returns);
+  }
+  if (is_thin != nullptr) *is_thin = thin_ones(returns);
+}
+
+void RangeImageView::measure(const Scan& scan, std::span<const SemanticClass> labels,
+                             std::vector<Return>& returns) {
   const auto wider = [](const RowRange& a, const RowRange& b) {
     return RowRange{std::min(a.first, b.first), std::max(a.last, b.last)};
   };
@@ -113,7 +145,31 @@ RangeImageView::RangeImageView(const Scan& scan, std::span<const SemanticClass> 
       },
       wider);
   fill(returns, labels);
-  if (is_thin != nullptr) *is_thin = thin_ones(returns);
+}
+
+float RangeImageView::columns_a_shot() const {
+  // So many rows tell.
+  constexpr int enough_rows = 16;
+  std::array<int, max_gap_columns + 1> gaps{};
+  for (int row = 0; row < rows_; row += std::max(1, rows_ / enough_rows)) {
+    int last = -1;
+    for (int column = 0; column < columns_; ++column) {
+      if (pixels_[index(row, column)] == 0.0F) continue;
+      if (last >= 0 && column - last <= max_gap_columns)
+        ++gaps[static_cast<std::size_t>(column - last)];
+      last = column;
+    }
+  }
+  const int all = std::accumulate(gaps.begin(), gaps.end(), 0);
+  int median = 1;
+  for (int seen = gaps[1]; 2 * seen < all; seen += gaps[static_cast<std::size_t>(median)]) ++median;
+  int count = 0;
+  int sum = 0;
+  for (int gap = 1; gap <= std::min(2 * median, max_gap_columns); ++gap) {
+    count += gaps[static_cast<std::size_t>(gap)];
+    sum += gap * gaps[static_cast<std::size_t>(gap)];
+  }
+  return count < min_gaps ? 1.0F : static_cast<float>(sum) / static_cast<float>(count);
 }
 
 void RangeImageView::fill(std::span<const Return> returns, std::span<const SemanticClass> labels) {
@@ -278,6 +334,28 @@ bool RangeImageView::sees_past(const Observation& point, float range_m) const {
     if (!column_sees_past(at, left, range_m) || !column_sees_past(at, right, range_m)) return false;
   }
   return true;
+}
+
+bool RangeImageView::lies_on_surface(const Observation& point, float tolerance_m) const {
+  const auto lies_between = [&](float a_m, float b_m) {
+    return point.point_range_m > std::min(a_m, b_m) - tolerance_m &&
+           point.point_range_m < std::max(a_m, b_m) + tolerance_m;
+  };
+  if (lies_between(point.range_m, point.range_m)) return true;
+  const auto goes_on = [&](int row, int column, float angle_rad) {
+    const float pixel = pixels_[index(row, column)];
+    const float range_m = std::abs(pixel);
+    return pixel != 0.0F && (pixel > 0.0F) == point.movable &&
+           std::abs(range_m - point.range_m) <= max_slope * angle_rad * point.range_m &&
+           lies_between(point.range_m, range_m);
+  };
+  const Direction& at = point.at;
+  const float column_rad = 2.0F * pi / static_cast<float>(columns_);
+  const float row_rad = 1.0F / rows_per_rad_;
+  return goes_on(at.row, (at.column + 1) % columns_, column_rad) ||
+         goes_on(at.row, (at.column + columns_ - 1) % columns_, column_rad) ||
+         (at.row > 0 && goes_on(at.row - 1, at.column, row_rad)) ||
+         (at.row + 1 < rows_ && goes_on(at.row + 1, at.column, row_rad));
 }
 
 bool RangeImageView::has_beam_near(const Observation& point, float distance_m) const {

@@ -49,6 +49,11 @@ class RangeImageView {
   /// above and below it, as far to the sides as rows are apart, one column at least.
   [[nodiscard]] bool sees_past(const Observation& point, float range_m) const;
 
+  /// Whether a point lies, within a tolerance, on what was measured in its direction, or on the
+  /// surface that goes on from there to the next row or column: along a wall that is seen at a
+  /// grazing angle ranges change by more from one beam to the next. Both may move, or neither.
+  [[nodiscard]] bool lies_on_surface(const Observation& point, float tolerance_m) const;
+
   /// Whether one of the beams that measured something round a point goes past it nearer than this
   /// [m], up or down, and not only on either side of it.
   [[nodiscard]] bool has_beam_near(const Observation& point, float distance_m) const;
@@ -77,6 +82,12 @@ class RangeImageView {
   };
   RangeImageView(const Scan& scan, std::span<const SemanticClass> labels, const SensorModel& sensor,
                  const Eigen::Isometry3d& T_map_lidar, std::vector<std::uint8_t>* is_thin);
+  /// Projects and fills as many columns as there are.
+  void measure(const Scan& scan, std::span<const SemanticClass> labels,
+               std::vector<Return>& returns);
+  /// From one column in which something was measured to the next one of its row, where the lidar
+  /// fires once in so many columns, 1 or more: the mean without gaps where rays did not return.
+  [[nodiscard]] float columns_a_shot() const;
   /// Returns the rows between which the points lie.
   RowRange project(std::span<const Eigen::Vector3f> points_lidar, std::span<Return> returns) const;
   /// Of each pixel the nearest return.

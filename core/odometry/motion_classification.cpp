@@ -107,8 +107,7 @@ PastObservation RangeImageHistory::observation(std::size_t age, const Eigen::Vec
   if (past.sees_past(*observation, observation->point_range_m + margin(observation->point_range_m)))
     return PastObservation::free;
   if (!observation->movable) return PastObservation::unknown;
-  if (std::abs(observation->range_m - observation->point_range_m) < same_surface_m)
-    return PastObservation::same;
+  if (past.lies_on_surface(*observation, same_surface_m)) return PastObservation::same;
   const float gap = observation->point_range_m - observation->range_m;
   if (gap < margin(observation->range_m) || gap > max_gone_gap_m) return PastObservation::unknown;
   const Eigen::Vector3f surface_map =
@@ -127,7 +126,7 @@ bool RangeImageHistory::sees_through(const RangeImageView& view,
 bool RangeImageHistory::saw_fixed_at(const Eigen::Vector3f& point_map) const {
   if (views_.empty()) return false;
   const auto seen = views_.front().observe(point_map);
-  return seen && !seen->movable && std::abs(seen->range_m - seen->point_range_m) < same_surface_m;
+  return seen && !seen->movable && views_.front().lies_on_surface(*seen, same_surface_m);
 }
 
 void RangeImageHistory::add(RangeImageView view) {

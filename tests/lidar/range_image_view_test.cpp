@@ -52,7 +52,7 @@ double beside_m(const Pixels& pixels, int row, int column, int step, int reach) 
   return nearest_m;
 }
 
-/// A few thousand points, several in many pixels and none in others, the outermost rows included.
+/// Points, several in most pixels and none in some rows, the outermost rows included.
 struct ScatteredPoints {
   Scan scan;
   std::vector<std::pair<int, int>> pixel_of;
@@ -63,8 +63,9 @@ struct ScatteredPoints {
     std::uniform_int_distribution<int> row(0, rings - 1), column(0, columns - 1);
     std::uniform_real_distribution<double> share(0.1, 0.9), range_m(2.0, 60.0);
     // No multiple of what is projected at once.
-    for (int i = 0; i < 9001; ++i) {
+    for (int i = 0; i < 40001; ++i) {
       const std::pair pixel(row(random), column(random));
+      if (pixel.first % 5 == 2) continue;
       const double r_m = range_m(random);
       scan.points_lidar.push_back(point_in(pixel.first, pixel.second, share(random), r_m));
       pixel_of.push_back(pixel);
@@ -165,6 +166,68 @@ TEST(RangeImageView, FindsWhatIsThinAsALookAtEveryPixelDoes) {
     }
   }
   EXPECT_GT(thin, 200);
+}
+
+/// Of a lidar that fires in every so many columns, and sees a wall all round it.
+RangeImageView view_of_few_shots(int columns_a_shot, SemanticClass label) {
+  Scan scan;
+  for (int row = 0; row < rings; ++row)
+    for (int column = 0; column < columns; column += columns_a_shot)
+      scan.points_lidar.push_back(point_in(row, column, 0.3, 10.0));
+  const std::vector<SemanticClass> labels(scan.size(), label);
+  return {scan, labels, one_degree_lidar(), Eigen::Isometry3d::Identity()};
+}
+
+TEST(RangeImageView, HasNoHolesBetweenTheShotsOfALidarThatFiresSeldom) {
+  for (const int columns_a_shot : {1, 2, 3, 5}) {
+    const RangeImageView view = view_of_few_shots(columns_a_shot, SemanticClass::building);
+    for (int column = 0; column < columns; ++column) {
+      const auto seen = view.observe(point_in(rings / 2, column, 0.5, 12.0));
+      ASSERT_TRUE(seen) << columns_a_shot << " columns a shot, column " << column;
+      EXPECT_NEAR(seen->range_m, 10.0F, 1e-4F);
+      EXPECT_TRUE(view.sees_past(*seen, 9.0F));
+      EXPECT_FALSE(view.sees_past(*seen, 11.0F));
+    }
+  }
+}
+
+/// Along x, 4 m to the left: its range changes by 6 m from one shot to the next, 20 m ahead.
+TEST(RangeImageView, KnowsAWallThatItSeesAtAGrazingAngle) {
+  Scan scan;
+  constexpr double wall_y_m = 4.0;
+  for (int row = 0; row < rings; ++row)
+    for (int column = 90; column < 180; ++column) {
+      const Eigen::Vector3f ray = point_in(row, column, 0.5, 1.0);
+      scan.points_lidar.emplace_back(static_cast<float>(wall_y_m) / ray.y() * ray);
+    }
+  const std::vector<SemanticClass> labels(scan.size(), SemanticClass::building);
+  const RangeImageView view(scan, labels, one_degree_lidar(), Eigen::Isometry3d::Identity());
+  for (double x_m = 2.0; x_m < 12.0; x_m += 0.01) {
+    const auto on_wall = view.observe(Eigen::Vector3d(x_m, wall_y_m, 0.0).cast<float>());
+    ASSERT_TRUE(on_wall);
+    EXPECT_TRUE(view.lies_on_surface(*on_wall, 0.05F)) << x_m;
+    const auto before_wall = view.observe(Eigen::Vector3d(x_m, wall_y_m - 1.0, 0.0).cast<float>());
+    ASSERT_TRUE(before_wall);
+    EXPECT_FALSE(view.lies_on_surface(*before_wall, 0.05F)) << x_m;
+  }
+}
+
+/// What stands behind something that could move is no surface of its own.
+TEST(RangeImageView, KnowsNoSurfaceBetweenTwoThings) {
+  Scan scan;
+  std::vector<SemanticClass> labels;
+  for (int row = 0; row < rings; ++row)
+    for (int column = 0; column < columns; ++column) {
+      const bool is_car = column % 4 < 2;
+      scan.points_lidar.push_back(point_in(row, column, 0.5, is_car ? 10.0 : 10.5));
+      labels.push_back(is_car ? SemanticClass::car : SemanticClass::building);
+    }
+  const RangeImageView view(scan, labels, one_degree_lidar(), Eigen::Isometry3d::Identity());
+  for (int column = 0; column < columns; ++column) {
+    const auto between = view.observe(point_in(rings / 2, column, 0.5, 10.25));
+    ASSERT_TRUE(between);
+    EXPECT_FALSE(view.lies_on_surface(*between, 0.1F)) << column;
+  }
 }
 
 }  // namespace
