@@ -179,6 +179,7 @@ void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& predi
       },
       [&] { parts.view = view_of(parts.scan, parts.labels, prediction.T_map_lidar); });
   parts.motion_classes = classify(parts, prediction.T_map_lidar);
+  find_upright_tangents(parts, config);
   parts.movable = movable;
 }
 
@@ -410,6 +411,7 @@ void Odometry::State::go_on_by_surfaces(const ScanInParts& parts, const Step& st
                     .motion_classes = parts.motion_classes,
                     .sparse_rings = has_sparse_rings(sensor),
                     .movable = parts.movable};
+  find_upright_tangents(again, config);
   // As this scan was registered: what was found to move stays out.
   FeatureSets registered = parts.movable == MovableUse::not_moving
                                ? registered_features(again, config)

@@ -2,7 +2,10 @@
 
 #include <tbb/parallel_invoke.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
+
+#include "core/odometry/ring_tangents.hpp"
 
 namespace stillmap {
 namespace {
@@ -20,6 +23,13 @@ constexpr std::size_t min_static_features = 100;
 /// leave 0.03 to 0.18, a jam of lorries between rails and trees 0.33, streets full of traffic 0.57.
 constexpr double min_share_left = 0.25;
 constexpr double enough_share_left = 0.4;
+/// The same of what tells the position along the direction in which what could not move tells
+/// least: beside a long wall cars alone may. Car parks before a hall leave 0.11 to 0.28, streets
+/// full of traffic 0.5 and more.
+constexpr double min_directed_share_left = 0.3;
+constexpr double enough_directed_share_left = 0.45;
+/// Not asked where what could move is a smaller share of what stands up.
+constexpr double min_share_movable = 0.2;
 
 /// Of fewer that count, no share tells [points].
 constexpr std::size_t min_telling_points = 30;
@@ -123,6 +133,37 @@ FeatureSets usable_features(const ScanInParts& parts, MovableUse use,
           .balance = has_rows ? parts.features.balance : 1.0};
 }
 
+/// What a point of something that stands up tells of the horizontal position: across a wall, along
+/// whose `tangent_lidar` its ring goes on, and half as much along any direction where it does not
+/// go straight on.
+Eigen::Matrix2d horizontal_information(const Eigen::Vector3f& tangent_lidar) {
+  constexpr double min_length = 0.3;
+  const Eigen::Vector2d along = tangent_lidar.head<2>().cast<double>();
+  if (along.norm() < min_length) return 0.5 * Eigen::Matrix2d::Identity();
+  const Eigen::Vector2d normal = Eigen::Vector2d(-along.y(), along.x()).normalized();
+  return normal * normal.transpose();
+}
+
+/// Which share of what tells the position is left without what could move, along the direction in
+/// which least is, 0..1; 1 where the upright tangents are not known.
+double least_share_left(const ScanInParts& parts, const OdometryConfig& config) {
+  if (parts.upright_tangents.empty()) return 1.0;
+  const UsablePoints fixed(parts, MovableUse::none, config);
+  const UsablePoints not_moving(parts, MovableUse::not_moving, config);
+  Eigen::Matrix2d left = Eigen::Matrix2d::Zero();
+  Eigen::Matrix2d all = Eigen::Matrix2d::Zero();
+  for (const std::uint32_t i : parts.features.upright_points) {
+    if (!not_moving(i) || is_ground(parts.labels.classes[i])) continue;
+    const Eigen::Matrix2d information = horizontal_information(parts.upright_tangents[i]);
+    all += information;
+    if (fixed(i)) left += information;
+  }
+  const Eigen::Vector2d weakest =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(left).eigenvectors().col(0);
+  const double told = weakest.dot(all * weakest);
+  return told < static_cast<double>(min_telling_points) ? 1.0 : weakest.dot(left * weakest) / told;
+}
+
 /// Whether without what could move hardly anything that stands up would be left, or of the ground,
 /// as in a car park, or where labels are wrong about all houses or the road.
 bool is_little_left(const ScanInParts& parts, const OdometryConfig& config) {
@@ -144,12 +185,26 @@ bool is_little_left(const ScanInParts& parts, const OdometryConfig& config) {
     return all >= min_telling_points &&
            static_cast<double>(left) < min_share * static_cast<double>(all);
   };
+  const double min_directed_share = parts.movable == MovableUse::not_moving
+                                        ? enough_directed_share_left
+                                        : min_directed_share_left;
   // Under a car the ground seems to stand up, too.
-  return is_left_out(parts.features.upright_points, /*counts_ground=*/false) ||
+  return least_share_left(parts, config) < min_directed_share ||
+         is_left_out(parts.features.upright_points, /*counts_ground=*/false) ||
          is_left_out(parts.features.level_points, /*counts_ground=*/true);
 }
 
 }  // namespace
+
+void find_upright_tangents(ScanInParts& parts, const OdometryConfig& config) {
+  parts.upright_tangents.clear();
+  if (parts.scan.ring.empty() || parts.labels.empty() || config.paper_exact) return;
+  const UsablePoints fixed(parts, MovableUse::none, config);
+  const auto& upright = parts.features.upright_points;
+  const auto movable = std::ranges::count_if(upright, [&](std::uint32_t i) { return !fixed(i); });
+  if (static_cast<double>(movable) >= min_share_movable * static_cast<double>(upright.size()))
+    parts.upright_tangents = ring_tangents(parts.scan, upright);
+}
 
 FeatureSets registered_features(ScanInParts& parts, const OdometryConfig& config) {
   if (!is_little_left(parts, config)) return fixed_or_parked_features(parts, config);

@@ -40,11 +40,17 @@ struct ScanInParts {
   /// Registered by surfaces, though few points have neighbours on another ring: the rings are far
   /// apart, or the local map is young.
   bool sparse_rings = false;
+  /// ring_tangents() of the scan for its upright points; empty where few of these could move, or
+  /// rings are not known.
+  std::vector<Eigen::Vector3f> upright_tangents{};
   /// At first that of the scan before.
   MovableUse movable = MovableUse::none;
   /// Farther off than this, rings lie farther apart than the neighbours that make a surface [m].
   float surfaces_reach_m = std::numeric_limits<float>::infinity();
 };
+
+/// Finds the upright tangents, where they are looked at.
+void find_upright_tangents(ScanInParts& parts, const OdometryConfig& config);
 
 /// The features that are registered: with semantics none on objects that could move, or (without
 /// earlier range images) those that pass eq. (9). Takes parked objects, too, where few are left,

@@ -69,6 +69,28 @@ TEST(MovableWorld, ACarParkHoldsSixteenRingsBeforeHousesFarOff) {
   EXPECT_LT(worst_error_m(world, Weighting::semantic, sensor), without_labels_m + 0.05);
 }
 
+/// A hall along the way, of which nothing tells how far the lidar has come, in sight of a lidar
+/// that fires 400 times a turn.
+TEST(MovableWorld, ACarParkHoldsTheLidarBeforeALongHall) {
+  SensorModel fires_seldom = test_lidar();
+  fires_seldom.columns = 400;
+  BoxWorld world = car_park();
+  world.stand(20.0, 62.0, {160.0, 10.0, 9.0}, SemanticClass::building);
+  OdometryConfig config;
+  Odometry odometry(config, test_lidar());
+  double worst_m = 0.0;
+  double x = 0.0;
+  for (int k = 0; k < 30; ++k) {
+    const Eigen::Isometry3d T_map_lidar(Eigen::Translation3d(x, 0.0, 0.0));
+    const BoxScan seen = world.scan(fires_seldom, T_map_lidar, 0.1 * k);
+    const OdometryResult found = register_scan(odometry, seen.scan, seen.labels()).result;
+    worst_m =
+        std::max(worst_m, (found.T_map_lidar.translation() - T_map_lidar.translation()).norm());
+    x += std::min(0.6, 0.04 * k);
+  }
+  EXPECT_LT(worst_m, 0.1);
+}
+
 /// Between rows of lorries that drive as the lidar does, and little else.
 TEST(MovableWorld, WhatDrivesAlongWithTheLidarIsNotCalledGood) {
   const double speed_m_s = 6.0;

@@ -125,6 +125,53 @@ TEST(RegisteredFeatures, DoNotChangeToAndFroBetweenOneScanAndTheNext) {
   EXPECT_EQ(fixed_features(points.parts, OdometryConfig{}).surfaces.size(), 100U);
 }
 
+/// A long wall along x, on which `wall` of the points are, and cars of which one shows its side and
+/// the next one its rear.
+LabelledPoints before_a_wall(std::size_t wall, std::size_t cars) {
+  LabelledPoints points(wall + 10 * cars, cars);
+  for (std::uint32_t i = 0; i < points.scan.size(); ++i) {
+    points.parts.features.upright_points.push_back(i);
+    const bool is_rear = i < 10 * cars && (i / 10) % 2 == 0;
+    points.parts.upright_tangents.push_back(is_rear ? Eigen::Vector3f::UnitY()
+                                                    : Eigen::Vector3f::UnitX());
+  }
+  return points;
+}
+
+TEST(RegisteredFeatures, TakeAllThatWasNotSeenMovingWhereItAloneTellsTheWayAlongAWall) {
+  LabelledPoints points = before_a_wall(200, 10);
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 300U);
+  EXPECT_EQ(points.parts.movable, MovableUse::not_moving);
+  LabelledPoints moving = before_a_wall(200, 10);
+  for (std::size_t k = 0; k < 10; ++k) moving.parts.motion_classes[k] = MotionClass::moving;
+  EXPECT_EQ(registered_features(moving.parts, OdometryConfig{}).surfaces.size(), 200U);
+}
+
+TEST(RegisteredFeatures, LeaveOutWhatCouldMoveWhereTheRestTellsTheWayAlongAWall) {
+  LabelledPoints points = before_a_wall(200, 10);
+  // Poles, which no ring goes straight on over.
+  for (std::size_t i = 100; i < 160; ++i) points.parts.upright_tangents[i].setZero();
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 200U);
+  points.parts.movable = MovableUse::not_moving;
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 300U)
+      << "less may be left before cars are taken up than when they are let go";
+}
+
+TEST(UprightTangents, AreLookedAtWhereAGoodPartCouldMove) {
+  LabelledPoints points(200, 10);
+  for (std::uint32_t i = 0; i < 200; ++i) points.parts.features.upright_points.push_back(i);
+  find_upright_tangents(points.parts, OdometryConfig{});
+  EXPECT_TRUE(points.parts.upright_tangents.empty()) << "rings are not known";
+  points.scan.ring.assign(200, 0);
+  find_upright_tangents(points.parts, OdometryConfig{});
+  EXPECT_EQ(points.parts.upright_tangents.size(), 200U);
+  LabelledPoints few(200, 2);
+  few.scan.ring.assign(200, 0);
+  for (std::uint32_t i = 0; i < 200; ++i) few.parts.features.upright_points.push_back(i);
+  find_upright_tangents(few.parts, OdometryConfig{});
+  EXPECT_TRUE(few.parts.upright_tangents.empty());
+}
+
 TEST(ParkedShare, IsThatOfTheObjectsThatWereNotSeenMoving) {
   LabelledPoints points(200, 10);
   EXPECT_EQ(parked_share(points.parts), 0.0);
