@@ -121,7 +121,7 @@ std::vector<dds::Diagnostic> Interface::diagnostics() {
                      .evidence = "another lidar's scans are mapped without this one's",
                      .hint = "start its driver, or correct its topic in 'sensors'"});
     }
-    for (dds::Diagnostic& diagnostic : receiver.loss_diagnostics()) {
+    for (dds::Diagnostic& diagnostic : receiver.diagnostics()) {
       all.push_back(std::move(diagnostic));
     }
   }

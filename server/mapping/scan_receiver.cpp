@@ -203,6 +203,7 @@ ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& co
       sweeps_(sweeps),
       queue_(queue),
       statistics_(statistics),
+      doubts_(topic_, !config.frames.base.empty() || !config.lidars.empty()),
       reader_(participant, topic_, points_of(config, ros_topic).reader),
       worker_("scans", std::chrono::seconds(0),
               [this, cloud = sensor_msgs::msg::PointCloud2()](const std::stop_token& stop) mutable {
@@ -253,8 +254,8 @@ void ScanReceiver::count_losses(const eprosima::fastrtps::rtps::SampleIdentity& 
                                   " got lost on the way: 'stillmap doctor' says why");
 }
 
-std::vector<dds::Diagnostic> ScanReceiver::loss_diagnostics() const {
-  std::vector<dds::Diagnostic> diagnostics;
+std::vector<dds::Diagnostic> ScanReceiver::diagnostics() const {
+  std::vector<dds::Diagnostic> diagnostics = doubts_.diagnostics();
   const auto losses = recent_losses_.losses(ScanLossWindow::Clock::now());
   if (losses.empty()) return diagnostics;
   const dds::RemoteParticipant self = participant_.self();
@@ -322,6 +323,7 @@ void ScanReceiver::pass_on(Lidar& lidar, std::vector<Scan> scans, const std::sto
   const auto received = std::chrono::steady_clock::now();
   for (Scan& scan : scans) {
     report(lidar, scan);
+    doubts_.add(lidar.name, scan);
     report_frame(lidar);
     if (sweeps_ != nullptr) {
       sweeps_->add(lidar.index, std::move(scan), stop);

@@ -19,6 +19,7 @@
 #include "idl/dds/sample_losses.hpp"
 #include "idl/interface/diagnostic.hpp"
 #include "sensor_msgs.h"
+#include "server/mapping/scan_doubts_report.hpp"
 #include "server/mapping/scan_queue.hpp"
 #include "server/monitoring/log.hpp"
 #include "server/monitoring/scan_loss_window.hpp"
@@ -81,8 +82,9 @@ class ScanReceiver {
   /// Why no scan has arrived yet; empty once one has.
   [[nodiscard]] std::string no_input_reason() const;
 
-  /// About publishers whose scans got lost lately.
-  [[nodiscard]] std::vector<dds::Diagnostic> loss_diagnostics() const;
+  /// About publishers whose scans got lost lately, and about scans that seem to be other than they
+  /// are taken for.
+  [[nodiscard]] std::vector<dds::Diagnostic> diagnostics() const;
 
  private:
   struct Lidar {
@@ -146,6 +148,7 @@ class ScanReceiver {
   ThrottledLog throttled_log_;
   /// What was told of clouds.
   NewLines layouts_;
+  ScanDoubtsReport doubts_;
   dds::SampleLosses losses_;
   ScanLossWindow recent_losses_;
   dds::Reader<sensor_msgs::msg::PointCloud2> reader_;

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/dataset/scan_dataset.hpp"
+#include "core/lidar/other_axes.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {
@@ -154,6 +155,35 @@ TEST(ArePartsOfATurn, WhereScansSeeOtherDirections) {
   EXPECT_FALSE(are_parts_of_a_turn(left, left));
   EXPECT_FALSE(are_parts_of_a_turn(street(-180.0, 144.0), street(-144.0, 180.0)));
   EXPECT_FALSE(are_parts_of_a_turn(left, Scan()));
+}
+
+/// Takes so many scans, and says how often what they show changed.
+template <class ScanOf>
+int changes_of(ScanDoubts& doubts, int scans, ScanOf scan_of) {
+  int changes = 0;
+  for (int k = 0; k < scans; ++k) changes += doubts.add(scan_of(k)) ? 1 : 0;
+  return changes;
+}
+
+TEST(ScanDoubts, AreSaidOnceWhereThreeLooksAgreeAndWithdrawnWhereThreeDoNot) {
+  const Scan ours = street(-180.0, 180.0), left = street(0.0, 180.0), right = street(-180.0, 0.0);
+  Scan upside_down = ours;
+  for (Eigen::Vector3f& p : upside_down.points_lidar) p.z() *= -1.0F;
+  ScanDoubts doubts(false);
+  EXPECT_EQ(changes_of(doubts, 500, [&](int) { return ours; }), 0);
+  // A look that another one contradicts says nothing.
+  EXPECT_EQ(changes_of(doubts, 100, [&](int) { return upside_down; }), 0);
+  EXPECT_EQ(changes_of(doubts, 50, [&](int) { return ours; }), 0);
+  EXPECT_EQ(changes_of(doubts, 500, [&](int) { return upside_down; }), 1);
+  EXPECT_EQ(doubts.said().up, "-z");
+  EXPECT_FALSE(doubts.said().are_parts);
+  EXPECT_EQ(changes_of(doubts, 500, [&](int) { return ours; }), 1);
+  EXPECT_EQ(doubts.said().up, std::nullopt);
+  EXPECT_EQ(changes_of(doubts, 500, [&](int k) { return k % 2 == 0 ? left : right; }), 1);
+  EXPECT_TRUE(doubts.said().are_parts);
+
+  ScanDoubts of_a_known_mount(true);
+  EXPECT_EQ(changes_of(of_a_known_mount, 500, [&](int) { return upside_down; }), 0);
 }
 
 TEST(RemarksOnScans, SayWhatASimulatorsScansAre) {

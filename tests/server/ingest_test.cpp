@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <mutex>
 #include <random>
@@ -175,6 +176,55 @@ TEST(ToldLidar, CloudsOfAnotherFrameAreCounted) {
     ASSERT_TRUE(wait_for_scans(client, mapped));
     EXPECT_EQ(client.status().counter("clouds_of_another_frame"), mapped - 3) << frame;
   }
+}
+
+/// What the status says of clouds, when so many scans came to which `change` was done.
+template <typename Change>
+std::vector<std::string> told_of(Change change, int scans, const std::string& more = "") {
+  const ServiceSetup setup("every", "save_period_s: 3600", more);
+  const ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  ScanPublisher publisher(setup.publisher(true));
+  EXPECT_TRUE(publisher.wait_for_subscriber(patience));
+  for (int i = 0; i < scans; ++i) {
+    Scan scan = room_scan(0);
+    scan.stamp_ns = room_pose(i).stamp_ns;
+    change(scan, i);
+    EXPECT_TRUE(publisher.publish(scan, {}, patience));
+  }
+  EXPECT_TRUE(eventually([&] {
+    return client.status().counter("scans_received") == static_cast<std::uint64_t>(scans);
+  }));
+  std::vector<std::string> told;
+  for (const dds::Diagnostic& one : client.status().diagnostics)
+    told.push_back(one.what + ": " + one.hint);
+  return told;
+}
+
+TEST(LiveClouds, OfOtherAxesAreToldByTheirGround) {
+  constexpr int scans = 102;
+  const auto upside_down = [](Scan& scan, int) {
+    for (Eigen::Vector3f& p : scan.points_lidar) p = {p.x(), -p.y(), -p.z()};
+  };
+  using testing::AllOf, testing::Contains, testing::HasSubstr, testing::Not;
+  EXPECT_THAT(told_of(upside_down, scans),
+              Contains(AllOf(HasSubstr("-z is up"), HasSubstr("{y: [-y], z: [-z]}"))));
+  EXPECT_THAT(told_of([](Scan&, int) {}, scans), Not(Contains(HasSubstr("is up"))));
+  // Where it is known how the lidar hangs, it is right so.
+  EXPECT_THAT(
+      told_of(upside_down, scans,
+              "frames: {base: base_link}\nmount: {xyz_m: [0, 0, 1.5], rpy_deg: [180, 0, 0]}"),
+      Not(Contains(HasSubstr("is up"))));
+}
+
+TEST(LiveClouds, OfHalfTurnsThatAreNotJoinedAreToldByWhereTheyLook) {
+  const auto halves = [](Scan& scan, int i) {
+    for (Eigen::Vector3f& p : scan.points_lidar)
+      if ((p.y() < 0.0F) == (i % 2 == 0)) p.setConstant(NAN);
+  };
+  EXPECT_THAT(told_of(halves, 102, "input: {clouds_per_turn: 1}"),
+              testing::Contains(testing::HasSubstr("parts of one turn")));
 }
 
 }  // namespace
