@@ -82,6 +82,26 @@ constexpr const char* network_hint =
 
 }  // namespace
 
+Diagnostic several_publishers_diagnostic(const std::string& topic,
+                                         const std::vector<std::string>& writer_guids,
+                                         const std::vector<RemoteParticipant>& peers) {
+  std::vector<std::string> publishers;
+  for (const std::string& guid : writer_guids) {
+    const RemoteParticipant* const peer = owner_of(guid, peers).first;
+    publishers.push_back(peer == nullptr ? "a publisher that is gone, or unknown"
+                                         : describe(*peer));
+  }
+  return {.severity = Severity::problem,
+          .what = topic + ": " + std::to_string(writer_guids.size()) +
+                  " publishers send scans in turns, and one lidar is expected",
+          .evidence = joined(publishers) +
+                      ": scans of each count as a next place of the same robot, or are dropped "
+                      "where their stamps are of another time",
+          .hint =
+              "stop all but one (a replay beside the robot?), or give each robot a server and "
+              "topics of its own; several lidars of one robot stand in 'sensors'"};
+}
+
 Diagnostic lost_scans_diagnostic(const std::string& topic, const ScanLosses& losses,
                                  const RemoteParticipant& self,
                                  const std::vector<RemoteParticipant>& peers) {

@@ -52,4 +52,9 @@ struct ScanLosses {
                                                const RemoteParticipant& self,
                                                const std::vector<RemoteParticipant>& peers);
 
+/// Of the writers that send scans on `topic` (its DDS name) in turns, where one lidar is expected.
+[[nodiscard]] Diagnostic several_publishers_diagnostic(const std::string& topic,
+                                                       const std::vector<std::string>& writer_guids,
+                                                       const std::vector<RemoteParticipant>& peers);
+
 }  // namespace stillmap::dds

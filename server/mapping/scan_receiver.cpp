@@ -248,6 +248,7 @@ void ScanReceiver::count_losses(const eprosima::fastrtps::rtps::SampleIdentity& 
   writer << scan.writer_guid();
   const std::uint64_t lost = losses_.add(scan);
   recent_losses_.add(writer.str(), lost, ScanLossWindow::Clock::now());
+  turns_.add(writer.str(), PublisherTurns::Clock::now());
   if (lost == 0) return;
   statistics_.scans_lost(lost);
   throttled_log_.warn("lost", std::to_string(lost) + " scans on " + topic_ +
@@ -257,12 +258,17 @@ void ScanReceiver::count_losses(const eprosima::fastrtps::rtps::SampleIdentity& 
 std::vector<dds::Diagnostic> ScanReceiver::diagnostics() const {
   std::vector<dds::Diagnostic> diagnostics = doubts_.diagnostics();
   const auto losses = recent_losses_.losses(ScanLossWindow::Clock::now());
-  if (losses.empty()) return diagnostics;
+  // Of several lidars, each may have a publisher.
+  const auto in_turns = lidars_.size() > 1 ? std::vector<std::string>()
+                                           : turns_.publishers(PublisherTurns::Clock::now());
+  if (losses.empty() && in_turns.empty()) return diagnostics;
   const dds::RemoteParticipant self = participant_.self();
   const std::vector<dds::RemoteParticipant> peers = participant_.remote_participants();
   for (const dds::ScanLosses& of_writer : losses) {
     diagnostics.push_back(dds::lost_scans_diagnostic(topic_, of_writer, self, peers));
   }
+  if (!in_turns.empty())
+    diagnostics.push_back(dds::several_publishers_diagnostic(topic_, in_turns, peers));
   return diagnostics;
 }
 

@@ -22,6 +22,7 @@
 #include "server/mapping/scan_doubts_report.hpp"
 #include "server/mapping/scan_queue.hpp"
 #include "server/monitoring/log.hpp"
+#include "server/monitoring/publisher_turns.hpp"
 #include "server/monitoring/scan_loss_window.hpp"
 #include "server/monitoring/statistics.hpp"
 #include "server/threads/periodic_worker.hpp"
@@ -82,8 +83,8 @@ class ScanReceiver {
   /// Why no scan has arrived yet; empty once one has.
   [[nodiscard]] std::string no_input_reason() const;
 
-  /// About publishers whose scans got lost lately, and about scans that seem to be other than they
-  /// are taken for.
+  /// About publishers whose scans got lost lately, or that send in turns where one lidar is
+  /// expected, and about scans that seem to be other than they are taken for.
   [[nodiscard]] std::vector<dds::Diagnostic> diagnostics() const;
 
  private:
@@ -151,6 +152,7 @@ class ScanReceiver {
   ScanDoubtsReport doubts_;
   dds::SampleLosses losses_;
   ScanLossWindow recent_losses_;
+  PublisherTurns turns_;
   dds::Reader<sensor_msgs::msg::PointCloud2> reader_;
   // Last: stops before what it uses is gone.
   PeriodicWorker worker_;

@@ -157,5 +157,14 @@ TEST(LostScans, AreExplainedByWhatThePublisherOffersAndHowItSends) {
   EXPECT_THAT(unknown, tells("scans of a publisher get lost"));
 }
 
+TEST(SeveralPublishers, AreNamedWhereTheyAreKnown) {
+  const auto two =
+      dds::several_publishers_diagnostic("rt/points", {"writer of clouds", "gone"}, lidar(true));
+  EXPECT_EQ(two.severity, dds::Severity::problem);
+  EXPECT_THAT(two, tells("2 publishers send scans in turns"));
+  EXPECT_THAT(two.evidence, AllOf(HasSubstr("lidar"), HasSubstr("unknown")));
+  EXPECT_THAT(two.hint, HasSubstr("'sensors'"));
+}
+
 }  // namespace
 }  // namespace stillmap::cli

@@ -227,5 +227,34 @@ TEST(LiveClouds, OfHalfTurnsThatAreNotJoinedAreToldByWhereTheyLook) {
               testing::Contains(testing::HasSubstr("parts of one turn")));
 }
 
+TEST(LiveClouds, OfTwoPublishersInTurnsAreTold) {
+  const ServiceSetup setup("every");
+  const ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  ScanPublisher robot(setup.publisher(true)), replay(setup.publisher(true));
+  const auto told = [&] {
+    return std::ranges::any_of(client.status().diagnostics, [](const dds::Diagnostic& one) {
+      return one.what.find("2 publishers send scans in turns") != std::string::npos;
+    });
+  };
+  int next = 0;
+  const auto send = [&](ScanPublisher& publisher) {
+    EXPECT_TRUE(publisher.wait_for_subscriber(patience));
+    EXPECT_TRUE(publisher.publish(room_scan(next++), {}, patience));
+  };
+  for (int k = 0; k < 4; ++k) send(robot);
+  for (int k = 0; k < 4; ++k) send(replay);
+  ASSERT_TRUE(wait_for_scans(client, static_cast<std::uint64_t>(next)));
+  EXPECT_FALSE(told());
+  for (int k = 0; k < 4; ++k) {
+    send(robot);
+    ASSERT_TRUE(wait_for_scans(client, static_cast<std::uint64_t>(next)));
+    send(replay);
+    ASSERT_TRUE(wait_for_scans(client, static_cast<std::uint64_t>(next)));
+  }
+  EXPECT_TRUE(told());
+}
+
 }  // namespace
 }  // namespace stillmap::test
