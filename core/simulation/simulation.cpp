@@ -5,7 +5,9 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <iomanip>
 #include <numbers>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -317,8 +319,10 @@ std::string SimulationConfig::faults() const {
   std::string out = plan.faults() + sensor.faults() + noise.faults() + flaws.faults(sensor);
   const auto check = [&](double value, double low, double high, const char* field) {
     if (value >= low && value <= high) return;
-    out += std::string("simulation.") + field + " is " + std::to_string(value) + ", must be " +
-           std::to_string(low) + " to " + std::to_string(high) + '\n';
+    std::ostringstream text;
+    text << std::setprecision(10) << "simulation." << field << " is " << value << ", must be "
+         << low << " to " << high << '\n';
+    out += text.str();
   };
   if (sensor.pattern != ScanPattern::rings)
     out += "simulation.sensor '" + sensor.name +

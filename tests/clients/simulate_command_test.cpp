@@ -32,6 +32,16 @@ TEST_F(SimulateCommandTest, SaysThatItWasStoppedAndKeepsWhatThereIs) {
   EXPECT_GE(line_count("city/poses.txt"), 2U);
 }
 
+TEST_F(SimulateCommandTest, NamesTheOptionThatCannotBe) {
+  const ProcessResult low = run("simulate " + path("city") + " --mount 1.2,0,0,0,5,0");
+  EXPECT_EQ(low.exit_code, 2);
+  EXPECT_EQ(low.err,
+            "stillmap: --mount: z, the lidar's height above the ground [m], is 0, must be 0.3 to "
+            "4\n");
+  EXPECT_THAT(run("simulate " + path("city") + " --scans 100001").err,
+              HasSubstr("--scans is 100001, must be 1 to 100000"));
+}
+
 TEST_F(SimulateCommandTest, WritesTheSamplesOfAnImuWhenAsked) {
   simulate("plain", 1);
   EXPECT_FALSE(exists("plain/imu.csv"));

@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <string_view>
+#include <utility>
 
 #include "config/loaders/sensor_file.hpp"
 #include "core/simulation/training_city.hpp"
@@ -44,6 +46,20 @@ std::string sensor_name(const std::string& written) {
   return written;
 }
 
+/// Faults of a configuration, in the words of the options that set it.
+std::string in_options(std::string faults) {
+  const std::pair<std::string_view, std::string_view> names[] = {
+      {"simulation.T_base_lidar.z", "--mount: z, the lidar's height above the ground [m],"},
+      {"simulation.scans", "--scans"},
+      {"simulation.sensor", "--sensor"}};
+  for (const auto& [field, option] : names) {
+    if (const std::size_t at = faults.find(field); at != std::string::npos)
+      faults.replace(at, field.size(), option);
+  }
+  while (faults.ends_with('\n')) faults.pop_back();
+  return faults;
+}
+
 }  // namespace
 
 void check_seed(const std::string& option, std::uint64_t seed) {
@@ -72,7 +88,7 @@ simulation::SimulationConfig simulation_config(const SimulationArguments& argume
   config.motion = simulation::lidar_motion(arguments.motion);
   config.T_base_lidar = arguments.mount.T_base_lidar();
   if (const std::string faults = config.faults(); !faults.empty()) {
-    throw std::invalid_argument(faults);
+    throw std::invalid_argument(in_options(faults));
   }
   return config;
 }
