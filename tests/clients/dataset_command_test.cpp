@@ -266,6 +266,23 @@ TEST_F(DatasetCommandTest, ExportSaysWhereLabelsComeFrom) {
   EXPECT_THAT(run(to_copy + " --labels none").out, HasSubstr("(0 with a label from 'none')"));
 }
 
+TEST_F(DatasetCommandTest, ScansOfADriveVoteOnTheLabelsThatAreExported) {
+  simulate("city", 8);
+  std::filesystem::create_directories(path("truth"));
+  std::filesystem::rename(path("city/labels"), path("truth/labels"));
+  const auto accuracy = [&](const std::string& more) {
+    const ProcessResult exported = run("dataset export " + path("city") + " " + path("out") +
+                                       " --force --labels model --columns 512" + more);
+    EXPECT_EQ(exported.exit_code, 0) << exported.err;
+    const ProcessResult result = run("evaluate segmentation --json --truth " + path("truth") +
+                                     " --predictions " + path("out/labels"));
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_TRUE(exists("out/labels/000007.label"));
+    return nlohmann::json::parse(result.out).at("accuracy").get<double>();
+  };
+  EXPECT_GT(accuracy(""), accuracy(" --drive-votes off") + 0.005);
+}
+
 TEST_F(DatasetCommandTest, NamesWhatItCannotUse) {
   simulate("city", 2);
   const auto refusal = [&](const std::string& arguments) {

@@ -131,6 +131,26 @@ TEST_F(EvaluateCommandTest, RunsTheNetworkOnAnImageOfTheWidthAskedFor) {
   EXPECT_EQ(run(command + " --columns 9000").exit_code, 2);
 }
 
+TEST_F(EvaluateCommandTest, ScansOfADriveVoteOnEachOthersLabels) {
+  simulate("city", 8);
+  const std::string command = "evaluate segmentation --json --columns 512 --truth " + path("city");
+  const auto evaluated = [&](const std::string& more) {
+    const ProcessResult result = run(command + more);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(result.out);
+  };
+  const nlohmann::json alone = evaluated(" --drive-votes off"), voted = evaluated("");
+  EXPECT_EQ(voted.at("points"), alone.at("points"));
+  EXPECT_GT(voted.at("accuracy"), alone.at("accuracy").get<double>() + 0.005);
+  // Of one scan there are no others.
+  EXPECT_EQ(evaluated(" --scans 1").at("accuracy"),
+            evaluated(" --scans 1 --drive-votes off").at("accuracy"));
+  // Scans without truth still tell where the others are.
+  std::filesystem::remove(path("city/labels/000003.label"));
+  EXPECT_LT(evaluated("").at("points"), voted.at("points"));
+  EXPECT_EQ(run(command + " --drive-votes maybe").exit_code, 2);
+}
+
 TEST_F(EvaluateCommandTest, BelievesTheMountAloneWhereAskedTo) {
   const std::string mount = " --mount 0,0,1.7,0,15,0";
   ASSERT_EQ(run("simulate " + path("leaning") + " --sensor vlp_16 --scans 1" + mount).exit_code, 0);

@@ -10,6 +10,7 @@
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/commands/dataset/drive_labels.hpp"
 #include "clients/commands/dataset/live_export.hpp"
 #include "clients/commands/dataset/recording.hpp"
 #include "clients/commands/dataset/sequence_export.hpp"
@@ -30,6 +31,7 @@ struct DatasetExportArguments {
   MapperArguments mapper;
   ScanRange range;
   ClientArguments client;
+  std::string drive_votes = "on";
   double idle_timeout_s = 10.0;
   bool force = false;
   bool json = false;
@@ -129,7 +131,8 @@ ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopS
   prepare_sequence_folder(arguments.out, arguments.force, sources);
   Progress progress("export", "scans", total);
   ExportSummary summary = export_sequence(
-      dataset, arguments.range, config, std::move(labels), arguments.out,
+      dataset, arguments.range, config, std::move(labels), arguments.drive_votes == "on",
+      arguments.out,
       [&](std::size_t seen) {
         progress.update(seen);
         return !stop.requested();
@@ -212,6 +215,7 @@ void add_dataset_export_command(CommandHandle dataset, Action& action) {
   add_recording_options(command, arguments->recording);
   command.option("OUT", arguments->out, "New folder for the sequence").required();
   add_mapper_options(command, arguments->mapper);
+  add_drive_votes_option(command, arguments->drive_votes);
   add_range_options(command, arguments->range);
   command.flag("--force", arguments->force,
                "Replace a sequence that is there already, with its labels");
@@ -228,7 +232,8 @@ void add_dataset_export_command(CommandHandle dataset, Action& action) {
       "  stillmap dataset export my_pcds campus --labels my_model --sensor vlp_16\n"
       "  stillmap dataset export topic:points campus --config server.yaml --scans 600\n"
       "Writes velodyne/*.bin (every scan and point in the order of the source; intensity 0..1),\n"
-      "labels/*.label (the source's own, else the first guess of --labels, of the running\n"
+      "labels/*.label (the source's own, else the first guess of --labels, see --drive-votes, of "
+      "the running\n"
       "server, or 0; for --labels the lidar stands as the mount in the file of --config says, see\n"
       "--stance), times.txt, calib.txt, and poses.txt\n"
       "from our odometry: camera frame of scan k into camera frame of scan 0, where calib.txt's\n"

@@ -1,9 +1,11 @@
 #include "clients/commands/dataset/sequence_export.hpp"
 
 #include <algorithm>
+#include <deque>
 #include <stdexcept>
 #include <utility>
 
+#include "clients/commands/dataset/drive_labels.hpp"
 #include "clients/commands/mapping/scans_ahead.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/gnss_file.hpp"
@@ -29,14 +31,15 @@ std::vector<Sample> samples_around(std::vector<Sample> samples, std::int64_t fir
 class SequenceExporter {
  public:
   SequenceExporter(const ScanDataset& dataset, bool strict, const MapperConfig& config,
-                   std::unique_ptr<Segmenter> labels, const std::filesystem::path& folder,
-                   const ScanSkipped& scan_skipped)
+                   std::unique_ptr<Segmenter> labels, bool drive_votes,
+                   const std::filesystem::path& folder, const ScanSkipped& scan_skipped)
       : dataset_(dataset),
         strict_(strict),
         scan_skipped_(scan_skipped),
         prepare_(config.prepare),
         scans_(dataset, config, std::move(labels)),
         mapper_(config, scans_.segmenter()),
+        labels_(drive_votes),
         folder_(folder),
         output_(folder) {}
 
@@ -61,31 +64,29 @@ class SequenceExporter {
   }
 
   void export_scan(std::size_t index) {
-    const std::optional<DatasetFrame> frame = read(index);
+    std::optional<DatasetFrame> frame = read(index);
     if (!frame) return;
     const std::optional<MappedScan> mapped = mapper_.process(frame->scan);
-    std::vector<std::uint32_t> raw_labels = frame->raw_labels;
-    const bool has_own =
-        std::ranges::any_of(raw_labels, [](std::uint32_t raw) { return (raw & 0xFFFFU) != 0; });
+    const bool has_own = std::ranges::any_of(
+        frame->raw_labels, [](std::uint32_t raw) { return (raw & 0xFFFFU) != 0; });
     scans_with_labels_ += has_own ? 1U : 0U;
     if (mapped) {
       T_map_lidar_ = mapped->odometry.T_map_lidar;
-      if (!has_own) {
-        raw_labels = labels_of_all_points(frame->scan, mapped->labelled.labels.classes, prepare_);
-      }
+      labels_.add(*mapped, has_own ? PointLabels{} : mapped->labelled.labels);
     } else {
+      labels_.add_without_pose({});
       ++without_pose_;
       scan_skipped_({index, mapper_.last_rejection().counter,
                      dataset_.file(index).string() +
                          " takes the pose of the scan before: " + mapper_.last_rejection().reason});
     }
-    // What reading corrects is corrected again when the export is read.
-    const bool is_corrected = dataset_.kitti_lidar().has_value();
-    output_.add(is_corrected ? dataset_.read_uncorrected(index).scan : frame->scan,
-                std::move(raw_labels), T_map_lidar_);
+    waiting_.push_back({index, std::move(*frame), has_own, T_map_lidar_});
+    write_labelled();
   }
 
   ExportSummary finish(bool stopped) {
+    labels_.finish();
+    write_labelled();
     ExportSummary summary = output_.finish();
     summary.label_source = label_source(summary.scans);
     summary.stopped = stopped;
@@ -99,6 +100,28 @@ class SequenceExporter {
   }
 
  private:
+  /// A scan whose labels are still voted on.
+  struct Waiting {
+    std::size_t index;
+    DatasetFrame frame;
+    bool has_own_labels;
+    Eigen::Isometry3d T_map_lidar;
+  };
+
+  void write_labelled() {
+    while (const auto labels = labels_.take()) {
+      Waiting& oldest = waiting_.front();
+      std::vector<std::uint32_t> raw_labels = std::move(oldest.frame.raw_labels);
+      if (!oldest.has_own_labels && !labels->empty())
+        raw_labels = labels_of_all_points(oldest.frame.scan, labels->classes, prepare_);
+      // What reading corrects is corrected again when the export is read.
+      const bool is_corrected = dataset_.kitti_lidar().has_value();
+      output_.add(is_corrected ? dataset_.read_uncorrected(oldest.index).scan : oldest.frame.scan,
+                  std::move(raw_labels), oldest.T_map_lidar);
+      waiting_.pop_front();
+    }
+  }
+
   std::optional<DatasetFrame> read(std::size_t index) {
     try {
       return scans_.read();
@@ -123,6 +146,8 @@ class SequenceExporter {
   PrepareConfig prepare_;
   ScansAhead scans_;
   Mapper mapper_;
+  DriveLabels labels_;
+  std::deque<Waiting> waiting_;
   std::filesystem::path folder_;
   SequenceOutput output_;
   std::size_t imu_samples_ = 0;
@@ -201,10 +226,11 @@ ExportSummary SequenceOutput::finish() const {
 
 ExportSummary export_sequence(const ScanDataset& dataset, const ScanRange& range,
                               const MapperConfig& config, std::unique_ptr<Segmenter> labels,
-                              const std::filesystem::path& folder, const ScanDone& scan_done,
-                              const ScanSkipped& scan_skipped) {
+                              bool drive_votes, const std::filesystem::path& folder,
+                              const ScanDone& scan_done, const ScanSkipped& scan_skipped) {
   const std::size_t end = range.end(dataset);
-  SequenceExporter run(dataset, range.strict, config, std::move(labels), folder, scan_skipped);
+  SequenceExporter run(dataset, range.strict, config, std::move(labels), drive_votes, folder,
+                       scan_skipped);
   run.export_samples(range.first, end);
   run.expect(range.first, end);
   bool keep_running = true;

@@ -67,10 +67,11 @@ class SequenceOutput {
 
 /// Writes a data set as a SemanticKITTI sequence: every point of every scan unchanged, poses from
 /// our odometry, the samples of its IMU and GNSS receiver, and for labels the data set's own where
-/// a scan has them, else those of `labels`. `scan_done` as for map_dataset. Throws DatasetError.
+/// a scan has them, else those of `labels`, with `drive_votes` after DriveVotes. `scan_done` as for
+/// map_dataset. Throws DatasetError.
 [[nodiscard]] ExportSummary export_sequence(const ScanDataset& dataset, const ScanRange& range,
                                             const MapperConfig& config,
-                                            std::unique_ptr<Segmenter> labels,
+                                            std::unique_ptr<Segmenter> labels, bool drive_votes,
                                             const std::filesystem::path& folder,
                                             const ScanDone& scan_done,
                                             const ScanSkipped& scan_skipped);

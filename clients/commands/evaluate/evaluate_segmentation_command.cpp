@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <deque>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -10,6 +11,7 @@
 #include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/arguments/scan_range.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/commands/dataset/drive_labels.hpp"
 #include "clients/commands/dataset/recording.hpp"
 #include "clients/commands/evaluate/segmentation_report.hpp"
 #include "clients/commands/stage_stopwatch.hpp"
@@ -34,24 +36,61 @@ struct SegmentationResult {
   double p99_ms = 0.0;
 };
 
+/// Compares the labels that were found for scans with the true ones, in the order of the scans.
+class Comparison {
+ public:
+  explicit Comparison(evaluation::SegmentationScore& score) : score_(score) {}
+
+  void expect(DatasetFrame frame) { expected_.push_back(std::move(frame)); }
+  void add(const PointLabels& found) {
+    const DatasetFrame& frame = expected_.front();
+    score_.add(frame.scan.points_lidar, reduced_classes(frame.raw_labels), found.classes);
+    expected_.pop_front();
+  }
+
+ private:
+  evaluation::SegmentationScore& score_;
+  std::deque<DatasetFrame> expected_;
+};
+
 /// Segments the scans of a labelled sequence and compares with its labels. Scans without labels
-/// are skipped. Throws DatasetError for a damaged file.
+/// are skipped; with `drive` they tell how the others lie to each other. Throws DatasetError for a
+/// damaged file.
 SegmentationResult segment_dataset(const ScanDataset& dataset, const ScanRange& range,
-                                   Segmenter& labels, const ScanDone& scan_done) {
+                                   Segmenter& labels, std::optional<DriveScans>& drive,
+                                   const ScanDone& scan_done) {
   SegmentationResult result;
   StageStopwatch times;
+  Comparison comparison(result.score);
+  const auto compare_voted = [&] {
+    while (const auto voted = drive->take()) comparison.add(*voted);
+  };
   const std::size_t end = range.end(dataset);
   for (std::size_t index = range.first; index < end; ++index) {
-    if (dataset.has_labels(index)) {
+    const bool has_truth = dataset.has_labels(index);
+    if (has_truth || drive) {
       DatasetFrame frame = dataset.read(index);
       frame.scan.labels.clear();
-      times.begin();
-      const PointLabels found = labels.segment(frame.scan);
-      times.end();
-      result.score.add(frame.scan.points_lidar, reduced_classes(frame.raw_labels), found.classes);
-      result.scans += 1;
+      std::optional<PointLabels> found;
+      if (has_truth) {
+        times.begin();
+        found = labels.segment(frame.scan);
+        times.end();
+        result.scans += 1;
+      }
+      if (drive) drive->add(frame.scan, found);
+      if (has_truth) comparison.expect(std::move(frame));
+      if (drive) {
+        compare_voted();
+      } else {
+        comparison.add(*found);
+      }
     }
     if (scan_done && !scan_done(index + 1 - range.first)) break;
+  }
+  if (drive) {
+    drive->finish();
+    compare_voted();
   }
   result.median_ms = times.total().quantile(0.5);
   result.p99_ms = times.total().quantile(0.99);
@@ -60,7 +99,7 @@ SegmentationResult segment_dataset(const ScanDataset& dataset, const ScanRange& 
 
 struct EvaluateSegmentationArguments {
   std::vector<std::string> truth;
-  std::string predictions, picture;
+  std::string predictions, picture, drive_votes = "on";
   MapperArguments mapper;
   MountArguments mount;
   ScanRange range;
@@ -152,8 +191,11 @@ SequenceScore run_model(const EvaluateSegmentationArguments& arguments, std::siz
       make_segmenter(arguments.mapper, dataset,
                      arguments.mount.T_base_lidar().value_or(Eigen::Isometry3d::Identity()));
   Progress progress("segment " + sequence, "scans", scans);
+  std::optional<DriveScans> drive;
+  if (arguments.drive_votes == "on")
+    drive.emplace(mapper_config(arguments.mapper, dataset.suggested_sensor()));
   const SegmentationResult result =
-      segment_dataset(dataset, arguments.range, *labels, [&](std::size_t seen) {
+      segment_dataset(dataset, arguments.range, *labels, drive, [&](std::size_t seen) {
         progress.update(seen);
         return true;
       });
@@ -220,6 +262,7 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
       command, arguments->mount,
       "How the lidar leans, and its height above the ground; default: upright, not known");
   add_segmentation_options(command, arguments->mapper);
+  add_drive_votes_option(command, arguments->drive_votes);
   command.option("--start", arguments->range.first, "Number of the first scan, or prediction");
   command.option("--scans,--count", arguments->range.count, "Take as many scans at most");
   command
@@ -237,7 +280,8 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
       "Predictions pair with the truth by name, and every one needs its truth; scans without a\n"
       "prediction do not count. A model gets scans as they were recorded, points that a server "
       "would\n"
-      "leave out (prepare) included; votes of the neighbours are, too.");
+      "leave out (prepare) included; votes of the neighbours and of the drive's other scans are, "
+      "too.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
