@@ -337,6 +337,8 @@ void Odometry::State::begin_anew(const FeatureSets& features, OdometryResult& re
   const bool has_first_alone = started && last.interval_s <= 0.0 && !has_prior_map;
   const bool is_lost_again = lost_scans > 0 && result.health == OdometryHealth::lost;
   if (!has_first_alone || !is_lost_again || !can_begin_map(features, config)) return;
+  const Eigen::Isometry3d T_map_lidar =
+      pose_to_last_scan(features, map, last, method()).value_or(last.T_map_lidar);
   map.clear();
   forget_objects();
   ring_start.clear();
@@ -344,7 +346,7 @@ void Odometry::State::begin_anew(const FeatureSets& features, OdometryResult& re
   started = false;
   // Another lidar may have been told since.
   is_by_surfaces = is_registered_by_surfaces(sensor, config);
-  result = OdometryResult{.T_map_lidar = last.T_map_lidar};
+  result = OdometryResult{.T_map_lidar = T_map_lidar};
   // Nobody knows where it is to the one before, which may be in a map.
   result.map_entry = MapEntry::stays_out;
   result.covariance = unknown_pose_covariance();

@@ -32,6 +32,14 @@ constexpr double max_point_deviation_rad = 0.035;
 constexpr double max_first_deviation_m = 0.1;
 constexpr double max_first_deviation_rad = 0.01;
 constexpr double min_first_gain = 0.25;
+/// What a coarse registration, or the alignment of points, of two scans must reach to be believed.
+constexpr double min_coarse_upright_fit = 0.05;
+constexpr double min_fit_of_points = 0.4;
+/// Either errs by up to this each time [m]: of a lidar at rest that would add up. Nor by more than
+/// this [rad].
+constexpr double coarse_error_m = 0.05;
+constexpr double points_error_m = 0.1;
+constexpr double coarse_error_rad = 0.02;
 /// Both kinds of points want to go the same way where one goes this share of what the other does
 /// along it, and either more than this [m].
 constexpr double min_same_way = 0.5;
@@ -347,6 +355,28 @@ OdometryResult confirmed_at_start(const OdometryResult& found, const FeatureSets
       return confirmed;
   }
   return confirmed_by_points(led_by_points(found, features, map, config), features, map, config);
+}
+
+std::optional<Eigen::Isometry3d> pose_to_last_scan(const FeatureSets& features, const LocalMap& map,
+                                                   const RegisteredScan& last,
+                                                   const OdometryConfig& config) {
+  const OdometryResult coarse =
+      register_features(features, coarse_map_of_scan(last.features, last.T_map_lidar),
+                        last.T_map_lidar, coarse_registration_config(config));
+  const auto moved = [&](const Eigen::Isometry3d& T_map_lidar, double error_m) {
+    const PoseTangent off = boxminus(T_map_lidar, last.T_map_lidar);
+    const bool is_at_rest =
+        off.head<3>().norm() < error_m && off.tail<3>().norm() < coarse_error_rad;
+    return is_at_rest ? last.T_map_lidar : T_map_lidar;
+  };
+  if (coarse.health == OdometryHealth::good && coarse.upright_fit >= min_coarse_upright_fit)
+    return moved(coarse.T_map_lidar, coarse_error_m);
+  const PointAlignmentConfig alignment{.without_movable = labels_tell_enough(features, config)};
+  const PointAlignment aligned =
+      align_points(features, map.points,
+                   align_points_around(features, map, last.T_map_lidar, config), {}, alignment);
+  if (!aligned.converged || aligned.fit < min_fit_of_points) return std::nullopt;
+  return moved(aligned.T_map_lidar, points_error_m);
 }
 
 OdometryResult moved_where_points_agree(const OdometryResult& found, const FeatureSets& features,

@@ -63,6 +63,15 @@ struct PosePrediction {
                                                 const FeatureSets& features, const LocalMap& map,
                                                 bool is_start_known, const OdometryConfig& config);
 
+/// Where a scan lies to the last one, which alone is in the map, where features are too few within
+/// the reach of registration: rings on walls 40 m off are farther apart. By features over the reach
+/// of a coarse map, where what stands up fits, else where the points align; nothing where most of
+/// them do not. The last scan's where that is no farther than either errs by.
+[[nodiscard]] std::optional<Eigen::Isometry3d> pose_to_last_scan(const FeatureSets& features,
+                                                                 const LocalMap& map,
+                                                                 const RegisteredScan& last,
+                                                                 const OdometryConfig& config);
+
 /// `found`, or, of a scan of which labels leave less than half, where the points align, degenerate,
 /// if those of any class and those of classes that cannot move want to go the same way: then it is
 /// not traffic that pulls them, but the few features left that slide, such as by wrong labels.

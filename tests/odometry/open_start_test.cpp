@@ -1,0 +1,78 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "tests/odometry/unlabelled_drive.hpp"
+
+namespace stillmap::test {
+namespace {
+
+/// A square with houses 60 to 75 m off, whose corners and gaps alone stand out.
+BoxWorld square() {
+  constexpr double far_m = 60.0, step_m = 24.0;
+  BoxWorld world;
+  world.noise_m = 0.015;
+  for (int house = 0; house < 5; ++house) {
+    const double along_m = step_m * (house - 2);
+    const double set_back_m = 1.5 * (house % 3), set_back_ahead_m = 1.5 * ((house + 1) % 3);
+    for (const double side : {-1.0, 1.0}) {
+      world.stand(along_m, side * (far_m + set_back_m), {18.0, 8.0, 8.0}, SemanticClass::building);
+      world.stand(side * (1.2 * far_m + set_back_ahead_m), along_m, {8.0, 14.4, 8.0},
+                  SemanticClass::building);
+    }
+  }
+  return world;
+}
+
+SensorModel sixteen_rings() {
+  SensorModel sensor = vlp_16();
+  sensor.columns = 720;
+  return sensor;
+}
+
+/// What of a drive over the square is off.
+struct Start {
+  int good = 0;
+  double worst_good_m = 0.0;
+  double worst_begun_m = 0.0;
+};
+
+Start start_on_square(double speed_m_s, int scans) {
+  constexpr int at_rest = 4;
+  OdometryConfig config;
+  config.weighting = Weighting::geometric;
+  Odometry odometry(config, sixteen_rings());
+  const BoxWorld world = square();
+  Start start;
+  for (int k = 0; k < scans; ++k) {
+    const Eigen::Isometry3d T_map_lidar = setting_off(std::max(k - at_rest, 0), speed_m_s);
+    Scan scan = world.scan(sixteen_rings(), T_map_lidar, 0.1 * k).scan;
+    scan.labels.clear();
+    const OdometryResult found = register_scan(odometry, std::move(scan), {}).result;
+    const double off_m = (found.T_map_lidar.translation() - T_map_lidar.translation()).norm();
+    if (found.health == OdometryHealth::initialised)
+      start.worst_begun_m = std::max(start.worst_begun_m, off_m);
+    if (found.health != OdometryHealth::good) continue;
+    ++start.good;
+    start.worst_good_m = std::max(start.worst_good_m, off_m);
+  }
+  return start;
+}
+
+// By 16 rings such walls are too far off for the first scans to be registered by: map after map
+// begins, until the lidar has moved. The last of them has to be where the lidar is then.
+TEST(OpenStart, TheMapBeginsWhereTheLidarIs) {
+  const Start start = start_on_square(3.0, 22);
+  EXPECT_GE(start.good, 5);
+  EXPECT_LT(start.worst_good_m, 0.1);
+  EXPECT_LT(start.worst_begun_m, 0.1);
+}
+
+TEST(OpenStart, ALidarAtRestStaysWhereItIs) {
+  const Start start = start_on_square(0.0, 10);
+  EXPECT_LT(start.worst_begun_m, 0.001);
+}
+
+}  // namespace
+}  // namespace stillmap::test
