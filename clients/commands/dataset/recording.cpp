@@ -51,9 +51,12 @@ void add_recording_options(CommandHandle command, RecordingArguments& recording)
               "What the numbers in its labels are: semantic_kitti (original ids), classes (0 to "
               "19); default: as in --config, else semantic_kitti if they look like it")
       .one_of({"semantic_kitti", "classes"});
-  command.option("--clouds-per-turn", recording.clouds_per_turn,
-                 "So many clouds that follow each other are a turn of the lidar, and one scan; 1: "
-                 "each is a scan, 0: found out; default: as in --config, else 0");
+  command
+      .option(
+          "--clouds-per-turn", recording.clouds_per_turn,
+          "So many clouds that follow each other are a turn of the lidar, and one scan; 1: each "
+          "is a scan, 0: found out; default: as in --config, else 0")
+      .zero_to(TurnJoiner::most);
 }
 
 ScanDataset open_recording(const std::string& path, const std::string& topic) {
