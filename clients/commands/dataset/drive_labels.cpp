@@ -30,6 +30,7 @@ DriveScans::DriveScans(const MapperConfig& config)
       mapper_(config, std::unique_ptr<Segmenter>(std::make_unique<NullSegmenter>())) {}
 
 void DriveScans::add(const Scan& scan, std::optional<PointLabels> labels) {
+  is_begun_ = true;
   const std::optional<MappedScan> mapped = mapper_.process(scan);
   if (!labels) return;
   std::vector<std::uint32_t> usable = usable_points(scan, prepare_);
@@ -45,6 +46,13 @@ void DriveScans::add(const Scan& scan, std::optional<PointLabels> labels) {
   } else {
     votes_.add_without_pose(std::move(of_usable));
   }
+}
+
+void DriveScans::leave() {
+  if (!is_begun_) return;
+  finish();
+  mapper_.reset(++maps_);
+  is_begun_ = false;
 }
 
 std::optional<PointLabels> DriveScans::take() {

@@ -46,6 +46,8 @@ class DriveScans {
   /// The next scan; with labels, all its points'. Points that a mapper leaves out keep theirs.
   void add(const Scan& scan, std::optional<PointLabels> labels);
   void finish() { votes_.finish(); }
+  /// The next scans are elsewhere.
+  void leave();
   /// Of the scans that had labels, in their order.
   [[nodiscard]] std::optional<PointLabels> take();
 
@@ -57,6 +59,9 @@ class DriveScans {
 
   PrepareConfig prepare_;
   Mapper mapper_;
+  std::uint64_t maps_ = 0;
+  /// Something was added since leave().
+  bool is_begun_ = false;
   DriveLabels votes_{true};
   std::deque<Waiting> waiting_;
 };

@@ -53,9 +53,26 @@ class Comparison {
   std::deque<DatasetFrame> expected_;
 };
 
+/// A scan without truth: where one with truth follows soon, it tells how that lies to those before.
+void follow(const ScanDataset& dataset, std::size_t index, std::size_t end, DriveScans& drive) {
+  constexpr std::size_t soon = 20;
+  for (std::size_t next = index + 1; next < std::min(end, index + soon); ++next) {
+    if (!dataset.has_labels(next)) continue;
+    try {
+      DatasetFrame frame = dataset.read(index);
+      frame.scan.labels.clear();
+      drive.add(frame.scan, std::nullopt);
+    } catch (const DatasetError&) {
+      // Nothing of it is compared.
+    }
+    return;
+  }
+  drive.leave();
+}
+
 /// Segments the scans of a labelled sequence and compares with its labels. Scans without labels
 /// are skipped; with `drive` they tell how the others lie to each other. Throws DatasetError for a
-/// damaged file.
+/// damaged file with labels.
 SegmentationResult segment_dataset(const ScanDataset& dataset, const ScanRange& range,
                                    Segmenter& labels, std::optional<DriveScans>& drive,
                                    const ScanDone& scan_done) {
@@ -67,25 +84,24 @@ SegmentationResult segment_dataset(const ScanDataset& dataset, const ScanRange& 
   };
   const std::size_t end = range.end(dataset);
   for (std::size_t index = range.first; index < end; ++index) {
-    const bool has_truth = dataset.has_labels(index);
-    if (has_truth || drive) {
+    if (dataset.has_labels(index)) {
       DatasetFrame frame = dataset.read(index);
       frame.scan.labels.clear();
-      std::optional<PointLabels> found;
-      if (has_truth) {
-        times.begin();
-        found = labels.segment(frame.scan);
-        times.end();
-        result.scans += 1;
-      }
-      if (drive) drive->add(frame.scan, found);
-      if (has_truth) comparison.expect(std::move(frame));
+      times.begin();
+      PointLabels found = labels.segment(frame.scan);
+      times.end();
+      result.scans += 1;
       if (drive) {
-        compare_voted();
+        drive->add(frame.scan, std::move(found));
+        comparison.expect(std::move(frame));
       } else {
-        comparison.add(*found);
+        comparison.expect(std::move(frame));
+        comparison.add(found);
       }
+    } else if (drive) {
+      follow(dataset, index, end, *drive);
     }
+    if (drive) compare_voted();
     if (scan_done && !scan_done(index + 1 - range.first)) break;
   }
   if (drive) {
