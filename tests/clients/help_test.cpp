@@ -127,9 +127,17 @@ TEST_F(HelpTest, WhatSaysNothingAloneNamesWhatItNeeds) {
   }
 }
 
+TEST_F(HelpTest, WhatSaysNothingOfLabelsInFilesIsRefused) {
+  for (const std::string option : {"--model street", "--drive-votes off", "--picture x.png"}) {
+    const ProcessResult result = run("evaluate segmentation --truth x --predictions y " + option);
+    EXPECT_EQ(result.exit_code, 2) << option;
+    EXPECT_THAT(result.err, HasSubstr("excludes --predictions")) << option;
+  }
+}
+
 TEST_F(HelpTest, WhatSaysNothingOfALiveTopicIsRefused) {
-  for (const std::string option :
-       {"--start 3", "--strict", "--topic-in points", "--label-kind classes"}) {
+  for (const std::string option : {"--start 3", "--strict", "--topic-in points",
+                                   "--label-kind classes", "--drive-votes off"}) {
     const ProcessResult result = run("dataset export topic:points x " + option);
     EXPECT_EQ(result.exit_code, 2) << option;
     EXPECT_THAT(result.err, HasSubstr(option.substr(0, option.find(' ')) + " is of recordings"));

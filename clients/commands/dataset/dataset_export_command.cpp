@@ -31,7 +31,7 @@ struct DatasetExportArguments {
   MapperArguments mapper;
   ScanRange range;
   ClientArguments client;
-  std::string drive_votes = "on";
+  std::string drive_votes;
   double idle_timeout_s = 10.0;
   bool force = false;
   bool json = false;
@@ -131,7 +131,7 @@ ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopS
   prepare_sequence_folder(arguments.out, arguments.force, sources);
   Progress progress("export", "scans", total);
   ExportSummary summary = export_sequence(
-      dataset, arguments.range, config, std::move(labels), arguments.drive_votes == "on",
+      dataset, arguments.range, config, std::move(labels), arguments.drive_votes != "off",
       arguments.out,
       [&](std::size_t seen) {
         progress.update(seen);
@@ -148,6 +148,7 @@ void check_options_of_topic(const DatasetExportArguments& arguments) {
                              : arguments.range.strict                  ? "--strict"
                              : !arguments.recording.topic_in.empty()   ? "--topic-in"
                              : !arguments.recording.label_kind.empty() ? "--label-kind"
+                             : !arguments.drive_votes.empty()          ? "--drive-votes"
                                                                        : nullptr;
   if (option == nullptr) return;
   throw std::invalid_argument(std::string(option) + " is of recordings, and " + arguments.source +

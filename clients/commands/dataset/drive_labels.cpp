@@ -7,13 +7,13 @@
 
 namespace stillmap::cli {
 
-void add_drive_votes_option(CommandHandle command, std::string& drive_votes) {
-  command
+OptionHandle add_drive_votes_option(CommandHandle command, std::string& drive_votes) {
+  return command
       .option("--drive-votes", drive_votes,
-              "on: labels that a model finds are voted on by the scans before and after, where "
+              "on (default): labels that a model finds are voted on by the scans before and after, "
+              "where "
               "odometry can tell how they lie to each other; off: each scan's as found alone")
-      .one_of({"on", "off"})
-      .with_default();
+      .one_of({"on", "off"});
 }
 
 void DriveLabels::add(const MappedScan& mapped, PointLabels labels) {

@@ -12,8 +12,8 @@
 
 namespace stillmap::cli {
 
-/// Adds --drive-votes, which says "on" or "off".
-void add_drive_votes_option(CommandHandle command, std::string& drive_votes);
+/// Adds --drive-votes, which says "on" or "off"; empty where it is not given, which is on.
+OptionHandle add_drive_votes_option(CommandHandle command, std::string& drive_votes);
 
 /// The labels that a segmenter found for the scans of a recorded drive, after the votes of the
 /// scans around each, for whoever has poses of them.

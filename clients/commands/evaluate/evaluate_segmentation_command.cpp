@@ -115,7 +115,7 @@ SegmentationResult segment_dataset(const ScanDataset& dataset, const ScanRange& 
 
 struct EvaluateSegmentationArguments {
   std::vector<std::string> truth;
-  std::string predictions, picture, drive_votes = "on";
+  std::string predictions, picture, drive_votes;
   MapperArguments mapper;
   MountArguments mount;
   ScanRange range;
@@ -208,7 +208,7 @@ SequenceScore run_model(const EvaluateSegmentationArguments& arguments, std::siz
                      arguments.mount.T_base_lidar().value_or(Eigen::Isometry3d::Identity()));
   Progress progress("segment " + sequence, "scans", scans);
   std::optional<DriveScans> drive;
-  if (arguments.drive_votes == "on")
+  if (arguments.drive_votes != "off")
     drive.emplace(mapper_config(arguments.mapper, dataset.suggested_sensor()));
   const SegmentationResult result =
       segment_dataset(dataset, arguments.range, *labels, drive, [&](std::size_t seen) {
@@ -278,7 +278,7 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
       command, arguments->mount,
       "How the lidar leans, and its height above the ground; default: upright, not known");
   add_segmentation_options(command, arguments->mapper);
-  add_drive_votes_option(command, arguments->drive_votes);
+  add_drive_votes_option(command, arguments->drive_votes).excludes(predictions);
   command.option("--start", arguments->range.first, "Number of the first scan, or prediction");
   command.option("--scans,--count", arguments->range.count, "Take as many scans at most");
   command
@@ -294,10 +294,9 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
       "  stillmap evaluate segmentation --model kitti --truth sequences/05 sequences/10\n"
       "  stillmap evaluate segmentation --truth tilted --mount 1.2,0,1.4,0,15,0\n"
       "Predictions pair with the truth by name, and every one needs its truth; scans without a\n"
-      "prediction do not count. A model gets scans as they were recorded, points that a server "
-      "would\n"
-      "leave out (prepare) included; votes of the neighbours and of the drive's other scans are, "
-      "too.");
+      "prediction do not count. A model gets scans as they were recorded, points that a server\n"
+      "would leave out (prepare) included; votes of the neighbours and of the drive's other scans\n"
+      "are, too.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
