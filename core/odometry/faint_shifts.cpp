@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "core/odometry/pose_search.hpp"
+#include "core/odometry/scan_features.hpp"
 #include "core/odometry/shift_witnesses.hpp"
 
 namespace stillmap {
@@ -17,6 +18,10 @@ constexpr double max_faint_share = 0.05;
 constexpr double beside_m = 0.3;
 /// Share of what the features count that must lie worse there.
 constexpr double min_fit_lost = 0.005;
+/// So many of each kind are asked first, and tell enough where they lose as much as this: five
+/// times what chance makes of so few.
+constexpr std::size_t few_features = 300;
+constexpr double clear_fit_lost = 0.1;
 /// How much wider the kernel is: what moves by a metre between scans still counts less than a
 /// tenth.
 constexpr double wide_kernel_scales = 6.0;
@@ -72,12 +77,15 @@ OdometryResult doubted_where_shift_fits(OdometryResult found, const FeatureSets&
   if (config.paper_exact || found.health != OdometryHealth::good) return found;
   const auto shift_map = faint_shift(found);
   if (!shift_map) return found;
-  const auto fit_at = [&](double way_m) {
-    return counted_fit(features, map, Eigen::Translation3d(way_m * *shift_map) * found.T_map_lidar,
-                       config, found.sweep_correction);
+  const auto fit_lost = [&](const FeatureSets& some) {
+    const auto fit_at = [&](double way_m) {
+      return counted_fit(some, map, Eigen::Translation3d(way_m * *shift_map) * found.T_map_lidar,
+                         config, found.sweep_correction);
+    };
+    return fit_at(0.0) - 0.5 * (fit_at(-beside_m) + fit_at(beside_m));
   };
-  const double fit_beside = 0.5 * (fit_at(-beside_m) + fit_at(beside_m));
-  if (fit_at(0.0) - fit_beside >= min_fit_lost) return found;
+  if (fit_lost(downsampled(features, few_features)) >= clear_fit_lost) return found;
+  if (fit_lost(features) >= min_fit_lost) return found;
   if (witnesses_tell(likely_shift(found, *shift_map), features, map, found, config)) return found;
   found.health = OdometryHealth::degenerate;
   // 1 m, as of all that the scan does not observe.
