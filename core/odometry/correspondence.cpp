@@ -28,16 +28,30 @@ struct Moments {
 
 Moments moments_of(const Neighbours& neighbours) {
   const auto count = static_cast<std::size_t>(neighbours.count);
-  Moments moments{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
-  for (std::size_t k = 0; k < count; ++k)
-    moments.centre += neighbours.points[k].position_map.cast<double>();
-  moments.centre /= static_cast<double>(count);
-  for (std::size_t k = 0; k < count; ++k) {
-    const Eigen::Vector3d d = neighbours.points[k].position_map.cast<double>() - moments.centre;
-    moments.covariance += d * d.transpose();
+  // About one of them, all others being near: far from the map's origin squares lose their digits.
+  const Eigen::Vector3f& first = neighbours.points[0].position_map;
+  double x = 0.0, y = 0.0, z = 0.0;
+  double xx = 0.0, xy = 0.0, xz = 0.0, yy = 0.0, yz = 0.0, zz = 0.0;
+  for (std::size_t k = 1; k < count; ++k) {
+    const Eigen::Vector3f& point = neighbours.points[k].position_map;
+    const double dx = static_cast<double>(point.x()) - static_cast<double>(first.x());
+    const double dy = static_cast<double>(point.y()) - static_cast<double>(first.y());
+    const double dz = static_cast<double>(point.z()) - static_cast<double>(first.z());
+    x += dx;
+    y += dy;
+    z += dz;
+    xx += dx * dx;
+    xy += dx * dy;
+    xz += dx * dz;
+    yy += dy * dy;
+    yz += dy * dz;
+    zz += dz * dz;
   }
-  moments.covariance /= static_cast<double>(count);
-  return moments;
+  const double share = 1.0 / static_cast<double>(count);
+  const Eigen::Vector3d mean = share * Eigen::Vector3d(x, y, z);
+  Eigen::Matrix3d squares;
+  squares << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+  return {first.cast<double>() + mean, share * squares - mean * mean.transpose()};
 }
 
 /// Smallest eigenvalue of a positive semidefinite matrix of trace 1, by Newton's method from 0: the

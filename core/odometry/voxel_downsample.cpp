@@ -115,33 +115,53 @@ class ScatteredWindows {
   ScatteredOrder in_window_;
 };
 
-/// So many cubes are worked out at once, in vector registers.
-constexpr std::size_t lanes = 16;
+/// The cubes of some points, worked out at once in vector registers, and which of them are not
+/// those of the points before.
+class CubeBatch {
+ public:
+  static constexpr std::size_t capacity = 64;
 
-/// Packed indices of the cubes of at most `lanes` points.
-std::array<std::uint64_t, lanes> cubes_of(std::span<const Eigen::Vector3f> points,
-                                          std::span<const std::uint32_t> some,
-                                          float inverse_spacing) {
-  using Block = Eigen::Array<float, lanes, 1>;
-  using Indices = Eigen::Array<int, lanes, 1>;
-  Block x = Block::Zero(), y = Block::Zero(), z = Block::Zero();
-  for (std::size_t k = 0; k < some.size(); ++k) {
-    const auto lane = static_cast<Eigen::Index>(k);
-    const Eigen::Vector3f& p = points[some[k]];
-    x[lane] = p.x();
-    y[lane] = p.y();
-    z[lane] = p.z();
+  explicit CubeBatch(float inverse_spacing) : inverse_spacing_(inverse_spacing) {}
+
+  /// At most `capacity` of them.
+  void place(std::span<const Eigen::Vector3f> points, std::span<const std::uint32_t> some) {
+    Block x = Block::Zero(), y = Block::Zero(), z = Block::Zero();
+    for (std::size_t k = 0; k < some.size(); ++k) {
+      const auto lane = static_cast<Eigen::Index>(k);
+      const Eigen::Vector3f& p = points[some[k]];
+      x[lane] = p.x();
+      y[lane] = p.y();
+      z[lane] = p.z();
+    }
+    for (auto* const cubes : {&x_, &y_, &z_}) (*cubes)[0] = (*cubes)[last_];
+    x_.tail<capacity>() = (x * inverse_spacing_).floor().cast<int>();
+    y_.tail<capacity>() = (y * inverse_spacing_).floor().cast<int>();
+    z_.tail<capacity>() = (z * inverse_spacing_).floor().cast<int>();
+    last_ = static_cast<Eigen::Index>(some.size());
+    for (std::size_t k = 0; k < capacity; ++k) {
+      const auto lane = static_cast<Eigen::Index>(k);
+      differs_[k] =
+          (x_[lane] ^ x_[lane + 1]) | (y_[lane] ^ y_[lane + 1]) | (z_[lane] ^ z_[lane + 1]);
+    }
   }
-  const Indices cube_x = (x * inverse_spacing).floor().cast<int>();
-  const Indices cube_y = (y * inverse_spacing).floor().cast<int>();
-  const Indices cube_z = (z * inverse_spacing).floor().cast<int>();
-  std::array<std::uint64_t, lanes> cubes;
-  for (std::size_t k = 0; k < lanes; ++k) {
-    const auto lane = static_cast<Eigen::Index>(k);
-    cubes[k] = packed_index(cube_x[lane], cube_y[lane], cube_z[lane]);
+  /// Whether the k-th lies in another cube than the one before, of the last batch for the first.
+  [[nodiscard]] bool is_next(std::size_t k) const { return differs_[k] != 0; }
+  /// Its packed index.
+  [[nodiscard]] std::uint64_t cube(std::size_t k) const {
+    const auto lane = static_cast<Eigen::Index>(k) + 1;
+    return packed_index(x_[lane], y_[lane], z_[lane]);
   }
-  return cubes;
-}
+
+ private:
+  using Block = Eigen::Array<float, static_cast<int>(capacity), 1>;
+  using Cubes = Eigen::Array<int, static_cast<int>(capacity) + 1, 1>;
+
+  float inverse_spacing_;
+  /// From the second on; the first ones are the last of the batch before.
+  Cubes x_ = Cubes::Zero(), y_ = Cubes::Zero(), z_ = Cubes::Zero();
+  Eigen::Index last_ = 0;
+  std::array<int, capacity> differs_;
+};
 
 /// Points that follow each other in the order of the scan and lie in one cube.
 struct Run {
@@ -154,7 +174,7 @@ std::vector<Run> runs_in_cubes(std::span<const Eigen::Vector3f> points,
   std::vector<Run> runs(chosen.size());
   std::size_t count = 0;
   std::size_t run_begin = 0;
-  std::uint64_t last_cube = ~std::uint64_t{0};
+  std::uint64_t last_cube = 0;
   const auto end_run = [&](std::size_t end) {
     if (end == run_begin) return;
     ++count;
@@ -163,13 +183,14 @@ std::vector<Run> runs_in_cubes(std::span<const Eigen::Vector3f> points,
     runs[count - 1] = {last_cube, chosen[(run_begin + end - 1 + count % 2) / 2]};
     run_begin = end;
   };
-  for (std::size_t begin = 0; begin < chosen.size(); begin += lanes) {
-    const auto some = chosen.subspan(begin, std::min(lanes, chosen.size() - begin));
-    const auto cubes = cubes_of(points, some, inverse_spacing);
+  CubeBatch batch(inverse_spacing);
+  for (std::size_t begin = 0; begin < chosen.size(); begin += CubeBatch::capacity) {
+    const auto some = chosen.subspan(begin, std::min(CubeBatch::capacity, chosen.size() - begin));
+    batch.place(points, some);
     for (std::size_t k = 0; k < some.size(); ++k) {
-      if (cubes[k] == last_cube) continue;
+      if (begin + k > 0 && !batch.is_next(k)) continue;
       end_run(begin + k);
-      last_cube = cubes[k];
+      last_cube = batch.cube(k);
     }
   }
   end_run(chosen.size());
