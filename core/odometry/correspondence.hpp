@@ -2,9 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
-#include <limits>
 #include <optional>
-#include <vector>
 
 #include "core/odometry/feature_map.hpp"
 #include "core/odometry/odometry_config.hpp"
@@ -98,27 +96,5 @@ struct Residual {
 
 [[nodiscard]] Residual residual(const Eigen::Vector3d& point_lidar,
                                 const Eigen::Isometry3d& T_map_lidar, const FittedSurface& surface);
-
-/// A feature of a scan and the surface of the local map that it should lie on.
-struct Correspondence {
-  Eigen::Vector3d point_lidar;
-  FittedSurface surface;
-  double inconsistency = 0.0;
-  double sweep_part = 0.0;
-  bool found = false;
-  bool in_known_space = false;
-  /// Where the neighbours were looked up; NaN: not yet.
-  Eigen::Vector3f searched_map = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
-};
-
-/// What its surface counts by how thin it is, 0..1: by the deviation [m] of planes that count half,
-/// or 0, where all count 1.
-[[nodiscard]] inline double thinness(const Correspondence& c, double plane_deviation_m) {
-  const double thin_m2 = plane_deviation_m * plane_deviation_m;
-  return thin_m2 > 0.0 ? thin_m2 / (thin_m2 + c.surface.variance_m2) : 1.0;
-}
-
-/// Of a scan's features, edges before planes before surfaces.
-using Correspondences = std::vector<Correspondence>;
 
 }  // namespace stillmap

@@ -61,6 +61,8 @@ void look_up(const FeaturePoint& feature, FeatureKind kind, const FeatureMap& ma
              : std::nullopt;
   found.found = surface.has_value();
   if (!surface) return;
+  const double thin_m2 = config.plane_deviation_m * config.plane_deviation_m;
+  found.thinness = thin_m2 > 0.0 ? thin_m2 / (thin_m2 + surface->variance_m2) : 1.0;
   found.surface = weighed_ring_line(*surface, found.point_lidar, R_map_lidar,
                                     ring_line_weights(feature, config));
   if (config.max_extrapolation > 0.0 && fitted->normal_count == 1 &&

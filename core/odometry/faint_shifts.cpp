@@ -45,10 +45,8 @@ OdometryResult register_with_faint_shifts(const FeatureSets& features, const Loc
                                           const Eigen::Isometry3d& T_map_lidar_predicted,
                                           const OdometryConfig& config,
                                           const SweepCorrection& sweep_correction) {
-  // Each begins where the one before has come to, or near there.
-  Correspondences correspondences;
-  const OdometryResult direct = register_features(features, map, T_map_lidar_predicted, config,
-                                                  sweep_correction, correspondences);
+  const OdometryResult direct =
+      register_features(features, map, T_map_lidar_predicted, config, sweep_correction);
   const bool is_clear = direct.health == OdometryHealth::lost ||
                         (direct.health == OdometryHealth::good && !faint_shift(direct));
   const bool has_kernel = config.registration.robust_scale_m > 0.0 && !config.paper_exact;
@@ -59,11 +57,11 @@ OdometryResult register_with_faint_shifts(const FeatureSets& features, const Loc
   OdometryConfig wide = config;
   wide.registration.robust_scale_m *= wide_kernel_scales;
   wide.registration.plane_deviation_m = wide.registration.sparse_ring_plane_deviation_m = 0.0;
-  const OdometryResult first = register_features(features, map, T_map_lidar_predicted, wide,
-                                                 sweep_correction, correspondences);
+  const OdometryResult first =
+      register_features(features, map, T_map_lidar_predicted, wide, sweep_correction);
   if (first.health == OdometryHealth::lost) return direct;
-  OdometryResult second = register_features(features, map, first.T_map_lidar, config,
-                                            first.sweep_correction, correspondences);
+  OdometryResult second =
+      register_features(features, map, first.T_map_lidar, config, first.sweep_correction);
   if (second.health == OdometryHealth::lost) return direct;
   if (score_of_first_motion(second, features, map, config) <
       score_of_first_motion(direct, features, map, config))

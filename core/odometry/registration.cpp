@@ -48,8 +48,7 @@ bool lies_on_level_plane(const FittedSurface& surface) {
 }
 
 NormalEquations build_normal_equations(std::span<const Correspondence> correspondences,
-                                       std::size_t edge_count, bool rolling,
-                                       double plane_deviation_m,
+                                       std::size_t edge_count, bool rolling, bool weighs_planes,
                                        const Eigen::Isometry3d& T_map_lidar,
                                        const OdometryConfig& config) {
   NormalEquations equations;
@@ -70,7 +69,7 @@ NormalEquations build_normal_equations(std::span<const Correspondence> correspon
     equations.upright_scores += is_level ? 0.0 : score;
     const double w = weight(config.weighting, config.alpha, distance, c.inconsistency) *
                      geman_mcclure(config.registration.robust_scale_m, squared) *
-                     thinness(c, plane_deviation_m);
+                     (weighs_planes ? c.thinness : 1.0);
     if (w <= 0.0) continue;
     for (std::size_t k = 0; k < r.count; ++k) {
       const double w_k = w * c.surface.weights[k];
@@ -293,30 +292,19 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
                                  const Eigen::Isometry3d& T_map_lidar_predicted,
                                  const OdometryConfig& config,
                                  const SweepCorrection& sweep_correction) {
-  Correspondences correspondences;
-  return register_features(features, map, T_map_lidar_predicted, config, sweep_correction,
-                           correspondences);
-}
-
-OdometryResult register_features(const FeatureSets& features, const LocalMap& map,
-                                 const Eigen::Isometry3d& T_map_lidar_predicted,
-                                 const OdometryConfig& config,
-                                 const SweepCorrection& sweep_correction,
-                                 Correspondences& correspondences) {
   const RegistrationLimits limits = limits_for(features, config.registration);
   OdometryResult result;
   result.T_map_lidar = T_map_lidar_predicted;
   result.sweep_correction = sweep_correction;
   const bool rolling = features.rolling && limits.sweep_translation_m > 0.0;
-  correspondences.resize(count_of(features));
+  std::vector<Correspondence> correspondences(count_of(features));
   NormalEquations equations;
   bool degenerate = false;
   bool weighs_planes = false;
   for (; result.iterations < limits.max_iterations && !result.converged; ++result.iterations) {
     find_all_correspondences(features, map, result, limits, correspondences);
     equations = build_normal_equations(correspondences, features.edges.size(), rolling,
-                                       weighs_planes ? limits.plane_deviation_m : 0.0,
-                                       result.T_map_lidar, config);
+                                       weighs_planes, result.T_map_lidar, config);
     if (equations.count() < limits.min_correspondences) break;
     const Eigen::Isometry3d before = result.T_map_lidar;
     degenerate = take_step(rolling ? &features.sweep_prior : nullptr, limits, equations, result);

@@ -85,15 +85,6 @@ struct LocalMap {
                                                const OdometryConfig& config,
                                                const SweepCorrection& sweep_correction = {});
 
-/// The same, which goes on with the correspondences of an earlier registration of these features in
-/// this map, or none, and leaves its own: what was looked up for a pose near by is not looked up
-/// again. `config` may differ in its weights, kernel and limits of steps alone.
-[[nodiscard]] OdometryResult register_features(const FeatureSets& features, const LocalMap& map,
-                                               const Eigen::Isometry3d& T_map_lidar_predicted,
-                                               const OdometryConfig& config,
-                                               const SweepCorrection& sweep_correction,
-                                               Correspondences& correspondences);
-
 /// How well a scan lies on the map at a pose that is not moved, 0..1: OdometryResult::fit by those
 /// distances alone that count, each feature by what it counts (FittedSurface::weights). Rings on
 /// level ground lie well wherever the lidar is, and leave it as it is.

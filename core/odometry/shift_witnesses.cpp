@@ -43,7 +43,7 @@ std::array<int, 2> place_of(const Eigen::Vector3d& point_lidar) {
 }
 
 Witness witness_of(const Correspondence& c, const Eigen::Isometry3d& T_map_lidar,
-                   const PoseTangent& shift, double plane_deviation_m) {
+                   const PoseTangent& shift) {
   if (!c.found) return {};
   const Residual r = residual(c.point_lidar, T_map_lidar, c.surface);
   double squared_m2 = 0.0;
@@ -54,9 +54,7 @@ Witness witness_of(const Correspondence& c, const Eigen::Isometry3d& T_map_lidar
     weight += c.surface.weights[k] * std::min(1.0, along * along);
   }
   const double ratio = score_scale_m * score_scale_m / (score_scale_m * score_scale_m + squared_m2);
-  return {.score = ratio * ratio,
-          .weight = weight * thinness(c, plane_deviation_m),
-          .place = place_of(c.point_lidar)};
+  return {.score = ratio * ratio, .weight = weight * c.thinness, .place = place_of(c.point_lidar)};
 }
 
 /// So many equal parts have the same sum and the same sum of squares.
@@ -104,7 +102,7 @@ bool witnesses_tell(const PoseTangent& shift, const FeatureSets& features, const
     std::vector<Witness> witnesses;
     witnesses.reserve(correspondences.size());
     for (const Correspondence& c : correspondences)
-      witnesses.push_back(witness_of(c, pose.T_map_lidar, shift, limits.plane_deviation_m));
+      witnesses.push_back(witness_of(c, pose.T_map_lidar, shift));
     return witnesses;
   };
   const std::vector<Witness> here = witnesses_at(0.0);

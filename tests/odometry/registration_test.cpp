@@ -367,21 +367,5 @@ TEST(RegisterFeatures, AnInconsistentLabelCountsByItsConfidence) {
   EXPECT_LT(1.2 * unsure, guessed);
 }
 
-TEST(RegisterFeatures, WhatWasLookedUpNearByIsKnown) {
-  const SurfaceWorld world = courtyard();
-  const LocalMap map = world.local_map();
-  const LocalMap empty{OdometryConfig{}.local_map};
-  const FeatureSets features = world.features(T_true, 0.01, 1);
-  Correspondences known;
-  const OdometryResult first = register_features(features, map, T_true, {}, {}, known);
-  ASSERT_EQ(first.health, OdometryHealth::good);
-  const OdometryResult again = register_features(features, empty, first.T_map_lidar, {}, {}, known);
-  EXPECT_EQ(again.health, OdometryHealth::good);
-  expect_near(again.T_map_lidar, first.T_map_lidar, 0.001, 0.0001);
-  const Eigen::Isometry3d T_far = T_true * Eigen::Translation3d(0.3, 0.0, 0.0);
-  EXPECT_EQ(register_features(features, empty, T_far, {}, {}, known).health, OdometryHealth::lost)
-      << "elsewhere it is not";
-}
-
 }  // namespace
 }  // namespace stillmap
