@@ -21,7 +21,8 @@ void insert_scan(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_li
   std::vector<std::uint8_t> is_thin;
   RangeImageView view(labelled.scan, sensor, T_map_lidar, is_thin);
   map.insert(labelled, T_map_lidar, is_thin);
-  if (map.clearing_due()) map.clear_seen_through(std::move(view), labelled.scan.stamp_ns);
+  const Clearing what = map.clearing_due(view.origin_map());
+  map.clear_seen_through(std::move(view), labelled.scan.stamp_ns, what);
 }
 
 void LendableMap::insert(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar) {

@@ -221,6 +221,9 @@ bool LiveTile::clear_seen_through(const VisibilityTest& test, std::uint32_t scan
     if (voxel.packed.point_count == 0 || voxel.is_restored != 0) return;
     const bool is_new = voxel.first_scan > test.last_scan_cleared && test.times_free_before;
     if (voxel.last_scan == scan && !is_new) return;
+    if (test.only_hit_before_ns &&
+        test.stamps->stamp_ns(voxel.last_scan) >= *test.only_hit_before_ns)
+      return;
     const Eigen::Vector3f position_map = mean_map(voxel);
     const Thin thin_by = thin(voxel);
     std::uint32_t misses = is_new ? test.times_free_before(position_map, thin_by) : 0;

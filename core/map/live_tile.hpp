@@ -66,6 +66,8 @@ struct VisibilityTest {
   bool only_hides = false;
   /// Those of the tile's scans; null: what is hidden says nothing of what is beside it.
   const ScanStamps* stamps = nullptr;
+  /// Of voxels that a scan from this time on has hit it counts no miss; needs `stamps`.
+  std::optional<std::int64_t> only_hit_before_ns{};
 };
 
 /// Which voxels have been there for so long that a point beside one, within what ranges and poses

@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cmath>
 #include <deque>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -49,6 +50,10 @@ const StaticMapConfig& checked(const StaticMapConfig& config) {
 /// What was there before the session, or for so long, is settled: a lidar that drives by has a
 /// place in sight for less.
 constexpr std::int64_t settled_ns = 60'000'000'000;
+
+/// In a session a scan clears what earlier ones have left where the lidar has come so far since one
+/// did [m]: rays from the same place tell the same once more.
+constexpr float session_step_m = 1.0F;
 
 /// Of a map that begins each of so many scans clears.
 constexpr std::uint64_t first_scans = 16;
@@ -146,6 +151,8 @@ struct StaticMap::State {
   std::optional<std::uint32_t> max_earlier_scans;
   /// Of the first scan of a later one.
   std::optional<std::int64_t> session_begin_ns;
+  /// From where the scan was taken that cleared last.
+  Eigen::Vector3f last_origin_map = Eigen::Vector3f::Constant(std::numeric_limits<float>::max());
   /// Tiles that the session has changed.
   std::set<TileId> in_session;
   /// Scans so far.
@@ -251,17 +258,22 @@ bool StaticMap::is_clearing() const {
   return !state_->is_frozen && state_->config.clearing_range_m > 0.0;
 }
 
-bool StaticMap::clearing_due() const {
-  return is_clearing() &&
-         (state_->begins() || state_->inserted % state_->config.clearing_interval == 0);
+Clearing StaticMap::clearing_due(const Eigen::Vector3f& origin_map) const {
+  if (!is_clearing()) return Clearing::none;
+  if (state_->begins() || state_->inserted % state_->config.clearing_interval == 0)
+    return Clearing::all;
+  const bool has_moved_on = (origin_map - state_->last_origin_map).norm() >= session_step_m;
+  return state_->session_begin_ns && has_moved_on ? Clearing::of_earlier_sessions : Clearing::none;
 }
 
-void StaticMap::clear_seen_through(RangeImageView view, std::int64_t stamp_ns) {
-  if (state_->is_frozen) return;
+void StaticMap::clear_seen_through(RangeImageView view, std::int64_t stamp_ns, Clearing what) {
+  if (state_->is_frozen || what == Clearing::none) return;
   const StaticMapConfig& config = state_->config;
   MapTiles& tiles = state_->tiles;
   const std::vector<LiveTile*> near = tiles.near(view.origin_map(), config.clearing_range_m);
   const std::uint32_t scan = tiles.stamps().add(stamp_ns);
+  const bool clears_all = what == Clearing::all;
+  state_->last_origin_map = view.origin_map();
   const VisibilityTest test{
       .is_free = [&](const Eigen::Vector3f& p_map,
                      Thin thin) { return state_->sees_through(view, p_map, thin); },
@@ -269,13 +281,14 @@ void StaticMap::clear_seen_through(RangeImageView view, std::int64_t stamp_ns) {
                                Thin thin) { return state_->times_free(p_map, thin); },
       .last_scan_cleared = state_->last_scan_cleared,
       .only_hides = state_->begins(),
-      .stamps = &tiles.stamps()};
+      .stamps = &tiles.stamps(),
+      .only_hit_before_ns = clears_all ? std::nullopt : state_->session_begin_ns};
   std::vector<std::uint8_t> hides(near.size());
   state_->enter_session(near);
   tbb::parallel_for(std::size_t{0}, near.size(), [&](std::size_t i) {
     hides[i] = near[i]->clear_seen_through(test, scan, state_->rule()) ? 1 : 0;
   });
-  state_->keep(std::move(view), scan);
+  if (clears_all) state_->keep(std::move(view), scan);
   tiles.begin_step();
   for (std::size_t i = 0; i < near.size(); ++i) {
     // Counts changed in all of them; only tiles with a voxel to hide are published again.

@@ -83,6 +83,15 @@ struct MemoryUse {
   std::size_t non_resident_tiles = 0;
 };
 
+/// Which voxels visibility clearing looks at.
+enum class Clearing : std::uint8_t {
+  none,
+  /// Those that no scan of this session has hit. What has gone since is in sight of few scans, and
+  /// each that has moved on looks through its place elsewhere.
+  of_earlier_sessions,
+  all,
+};
+
 /// The planning map: stationary points only, as labelled voxels in tiles (paper II-C.2). One
 /// thread writes; views are immutable and may be read from any thread.
 class StaticMap {
@@ -113,12 +122,13 @@ class StaticMap {
 
   /// Whether scans clear at all, some of them.
   [[nodiscard]] bool is_clearing() const;
-  /// Whether visibility clearing is due for the scan inserted last.
-  [[nodiscard]] bool clearing_due() const;
+  /// What visibility clearing is due for with the scan inserted last, which was taken from there.
+  [[nodiscard]] Clearing clearing_due(const Eigen::Vector3f& origin_map) const;
   /// Visibility clearing: counts a miss for each voxel that this scan saw through, and for each
   /// voxel that is new as many as earlier scans saw through its place. What stood there is not part
   /// of the static world, whatever its class.
-  void clear_seen_through(RangeImageView view, std::int64_t stamp_ns);
+  void clear_seen_through(RangeImageView view, std::int64_t stamp_ns,
+                          Clearing what = Clearing::all);
 
   /// Moves what was seen from poses that were wrong, by TileCorrection. Non-resident tiles that
   /// change are reloaded: nothing, and the map stays as it is, where it would then take more than
