@@ -252,9 +252,8 @@ FeatureSets map_features(const ScanInParts& parts, const std::vector<Motion>& mo
   return sets;
 }
 
-FeatureSets downsampled(FeatureSets features) {
-  constexpr std::size_t enough = 1000;
-  const auto downsample = [](std::vector<FeaturePoint>& points) {
+FeatureSets downsampled(FeatureSets features, std::size_t enough) {
+  const auto downsample = [enough](std::vector<FeaturePoint>& points) {
     if (points.size() <= enough) return;
     for (std::size_t k = 0; k < enough; ++k) points[k] = points[k * points.size() / enough];
     points.resize(enough);

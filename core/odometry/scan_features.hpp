@@ -73,8 +73,9 @@ void find_upright_tangents(ScanInParts& parts, const OdometryConfig& config);
 [[nodiscard]] FeatureSets map_features(const ScanInParts& parts, const std::vector<Motion>& motion,
                                        const OdometryConfig& config);
 
-/// Enough features to find a place by, and to tell which of several starts leads there.
-[[nodiscard]] FeatureSets downsampled(FeatureSets features);
+/// At most so many features of each kind, spread evenly: by default enough to find a place by, and
+/// to tell which of several starts leads there.
+[[nodiscard]] FeatureSets downsampled(FeatureSets features, std::size_t enough = 1000);
 
 /// Adds edges and planes to the map, compensated for `motion` beyond what they were, and
 /// removes what is far from the lidar.
