@@ -122,8 +122,9 @@ void DriveVotes::decide_next() {
   VotingScan& scan = window_[next_++];
   ++decided_scans_;
   PointLabels labels = std::move(scan.labels);
-  // Alone, it has voted in voxels of its own before.
-  if (window_.size() == 1) {
+  // Where no other one votes, it has voted in voxels of its own before.
+  const auto votes = [](const VotingScan& other) { return !other.voxels.empty(); };
+  if (std::ranges::count_if(window_, votes) < 2) {
     done_.push_back(std::move(labels));
     return;
   }

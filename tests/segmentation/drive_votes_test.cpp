@@ -176,5 +176,21 @@ TEST(DriveVotesTest, FaultyConfigurationsAreRefused) {
   EXPECT_THROW(DriveVotes{config}, std::invalid_argument);
 }
 
+TEST(DriveVotesTest, AScanAmongScansWithoutLabelsKeepsItsOwn) {
+  DriveVotes votes;
+  const auto points = wall_seen_from(Eigen::Isometry3d::Identity());
+  PointLabels labels = all_of(SemanticClass::building, 0.9F);
+  labels.classes[41] = SemanticClass::vegetation;
+  labels.confidence[41] = 0.1F;
+  votes.add(points, {}, Eigen::Isometry3d::Identity());
+  votes.add(points, labels, Eigen::Isometry3d::Identity());
+  votes.add(points, {}, Eigen::Isometry3d::Identity());
+  votes.finish();
+  ASSERT_TRUE(votes.take());
+  const auto found = votes.take();
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->classes, labels.classes);
+}
+
 }  // namespace
 }  // namespace stillmap

@@ -6,6 +6,17 @@
 #include "core/segmentation/segmenter.hpp"
 
 namespace stillmap::cli {
+namespace {
+
+/// Nobody reads the static map: of no points it takes neither memory nor time.
+MapperConfig without_static_map(MapperConfig config) {
+  constexpr double nothing_m = 1e-3;
+  config.static_map.max_range_m = nothing_m;
+  config.static_map.clearing_range_m = 0.0;
+  return config;
+}
+
+}  // namespace
 
 OptionHandle add_drive_votes_option(CommandHandle command, std::string& drive_votes) {
   return command
@@ -25,17 +36,24 @@ void DriveLabels::add(const MappedScan& mapped, PointLabels labels) {
              is_voted_ && has_pose ? std::optional(mapped.odometry.T_map_lidar) : std::nullopt);
 }
 
+void DriveLabels::pass(const std::optional<MappedScan>& mapped) {
+  if (!mapped || mapped->odometry.health != OdometryHealth::good) votes_.finish();
+}
+
 DriveScans::DriveScans(const MapperConfig& config)
     : prepare_(config.prepare),
-      mapper_(config, std::unique_ptr<Segmenter>(std::make_unique<NullSegmenter>())) {}
+      mapper_(without_static_map(config),
+              std::unique_ptr<Segmenter>(std::make_unique<NullSegmenter>())) {}
 
 void DriveScans::add(const Scan& scan, std::optional<PointLabels> labels) {
   is_begun_ = true;
   const std::optional<MappedScan> mapped = mapper_.process(scan);
-  if (!labels) return;
+  if (!labels) return votes_.pass(mapped);
   std::vector<std::uint32_t> usable = usable_points(scan, prepare_);
   if (labels->empty()) usable.clear();
   PointLabels of_usable;
+  of_usable.classes.reserve(usable.size());
+  of_usable.confidence.reserve(usable.size());
   for (const std::uint32_t point : usable) {
     of_usable.classes.push_back(labels->classes[point]);
     of_usable.confidence.push_back(labels->confidence[point]);

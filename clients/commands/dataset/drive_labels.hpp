@@ -24,6 +24,9 @@ class DriveLabels {
 
   /// The next scan, with the classes of its usable points, as Mapper::process() left it.
   void add(const MappedScan& mapped, PointLabels labels);
+  /// The next scan has no labels to vote on: without a good pose it parts what was before from what
+  /// follows.
+  void pass(const std::optional<MappedScan>& mapped);
   /// The next scan has no pose.
   void add_without_pose(PointLabels labels) { votes_.add({}, std::move(labels), std::nullopt); }
 
@@ -46,6 +49,8 @@ class DriveScans {
   /// The next scan; with labels, all its points'. Points that a mapper leaves out keep theirs.
   void add(const Scan& scan, std::optional<PointLabels> labels);
   void finish() { votes_.finish(); }
+  /// Whether scans were added since leave(), which the next one lies to.
+  [[nodiscard]] bool is_begun() const { return is_begun_; }
   /// The next scans are elsewhere.
   void leave();
   /// Of the scans that had labels, in their order.

@@ -53,21 +53,43 @@ class Comparison {
   std::deque<DatasetFrame> expected_;
 };
 
-/// A scan without truth: where one with truth follows soon, it tells how that lies to those before.
-void follow(const ScanDataset& dataset, std::size_t index, std::size_t end, DriveScans& drive) {
-  constexpr std::size_t soon = 20;
-  for (std::size_t next = index + 1; next < std::min(end, index + soon); ++next) {
-    if (!dataset.has_labels(next)) continue;
-    try {
-      DatasetFrame frame = dataset.read(index);
-      frame.scan.labels.clear();
-      drive.add(frame.scan, std::nullopt);
-    } catch (const DatasetError&) {
-      // Nothing of it is compared.
+/// Which scans have truth. Each is looked at once: of clouds in files of their own all is read.
+class Truths {
+ public:
+  Truths(const ScanDataset& dataset, std::size_t end) : dataset_(dataset), end_(end) {}
+
+  /// Whether one of those from `first` on, and before `last`, has; `first` never decreases.
+  [[nodiscard]] bool any(std::size_t first, std::size_t last) {
+    if (next_ < first) {
+      next_ = first;
+      is_found_ = false;
     }
-    return;
+    while (!is_found_ && next_ < std::min(last, end_)) {
+      is_found_ = dataset_.has_labels(next_);
+      if (!is_found_) ++next_;
+    }
+    return is_found_ && next_ < last;
   }
-  drive.leave();
+
+ private:
+  const ScanDataset& dataset_;
+  std::size_t end_;
+  std::size_t next_ = 0;
+  bool is_found_ = false;
+};
+
+/// A scan without truth: between scans with truth it tells how these lie to each other.
+void follow(const ScanDataset& dataset, std::size_t index, Truths& truths, DriveScans& drive) {
+  constexpr std::size_t soon = 20;
+  if (!drive.is_begun()) return;
+  if (!truths.any(index + 1, index + soon)) return drive.leave();
+  try {
+    DatasetFrame frame = dataset.read(index);
+    frame.scan.labels.clear();
+    drive.add(frame.scan, std::nullopt);
+  } catch (const DatasetError&) {
+    // Nothing of it is compared.
+  }
 }
 
 /// Segments the scans of a labelled sequence and compares with its labels. Scans without labels
@@ -83,8 +105,9 @@ SegmentationResult segment_dataset(const ScanDataset& dataset, const ScanRange& 
     while (const auto voted = drive->take()) comparison.add(*voted);
   };
   const std::size_t end = range.end(dataset);
+  Truths truths(dataset, end);
   for (std::size_t index = range.first; index < end; ++index) {
-    if (dataset.has_labels(index)) {
+    if (truths.any(index, index + 1)) {
       DatasetFrame frame = dataset.read(index);
       frame.scan.labels.clear();
       times.begin();
@@ -99,7 +122,7 @@ SegmentationResult segment_dataset(const ScanDataset& dataset, const ScanRange& 
         comparison.add(found);
       }
     } else if (drive) {
-      follow(dataset, index, end, *drive);
+      follow(dataset, index, truths, *drive);
     }
     if (drive) compare_voted();
     if (scan_done && !scan_done(index + 1 - range.first)) break;
@@ -283,7 +306,8 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
   command.option("--scans,--count", arguments->range.count, "Take as many scans at most");
   command
       .option("--picture", arguments->picture,
-              "PNG of the first scan's range image: true classes above those that the model found")
+              "PNG of the first scan's range image: true classes above those that the model found "
+              "in it alone")
       .ends_in(".png")
       .excludes(predictions);
   command.flag("--json", arguments->json, "Print JSON");
