@@ -232,6 +232,8 @@ double ScanDataset::period_s() const {
 
 std::size_t ScanDataset::find_clouds_per_turn() const {
   constexpr std::size_t places = 5, max_clouds = 200;
+  // Stamps that are made up do not tell how long a turn lasts.
+  constexpr std::int64_t untimed_step_ns = 1'000'000;
   std::vector<std::size_t> found;
   for (std::size_t k = 0; k < places; ++k) {
     const std::size_t first = files_.size() * k / places;
@@ -240,7 +242,10 @@ std::size_t ScanDataset::find_clouds_per_turn() const {
     for (std::size_t part = first; part < end && recognition.clouds_per_turn() == 0; ++part) {
       try {
         const Scan cloud = read_part(part).scan;
-        recognition.learn({.stamp_ns = cloud.stamp_ns, .arc = viewed_arc(cloud.points_lidar)});
+        const std::int64_t stamp_ns = times_unit_ == TimesUnit::none
+                                          ? untimed_step_ns * static_cast<std::int64_t>(part)
+                                          : cloud.stamp_ns;
+        recognition.learn({.stamp_ns = stamp_ns, .arc = viewed_arc(cloud.points_lidar)});
       } catch (const DatasetError&) {
         // Whoever reads that scan is told.
         recognition = {};

@@ -4,6 +4,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <utility>
 
@@ -40,8 +41,10 @@ bool is_same_view(const ViewedArc& a, const ViewedArc& b) {
 /// How far clouds have led round, by the directions of their middles.
 class WayRound {
  public:
-  void add(const ViewedArc& arc) {
+  /// `clouds` after the last arc: more than one where those between showed nothing.
+  void add(const ViewedArc& arc, std::size_t clouds) {
     if (!arcs_.empty()) {
+      clouds_ += clouds;
       const double step = positive_deg(middle_deg(arc) - middle_deg(arcs_.back()));
       anticlockwise_deg_ += step;
       clockwise_deg_ += 360.0 - step;
@@ -51,9 +54,7 @@ class WayRound {
 
   /// Halves lead as far one way as the other.
   [[nodiscard]] double turned_deg() const { return std::min(anticlockwise_deg_, clockwise_deg_); }
-  [[nodiscard]] double step_deg() const {
-    return turned_deg() / static_cast<double>(arcs_.size() - 1);
-  }
+  [[nodiscard]] double step_deg() const { return turned_deg() / static_cast<double>(clouds_); }
   [[nodiscard]] bool is_twice_round() const {
     return arcs_.size() > 1 && turned_deg() > 720.0 - 0.5 * step_deg();
   }
@@ -73,6 +74,8 @@ class WayRound {
 
  private:
   std::vector<ViewedArc> arcs_;
+  /// After the first arc, up to the last one.
+  std::size_t clouds_ = 0;
   double anticlockwise_deg_ = 0.0;
   double clockwise_deg_ = 0.0;
 };
@@ -81,8 +84,11 @@ class WayRound {
 /// than another cloud in the scan.
 std::size_t clouds_per_turn(const WayRound& way) {
   constexpr double may_lack = 0.3;
-  // Of what stands beside the lidar, or the sky, a part may show less than it looks at.
-  const double clouds = std::min(360.0 / way.widest_deg(), 360.0 / way.step_deg());
+  // Beams that do not fire in line widen what a part shows, and the sky narrows it: steps tell. But
+  // those of more than half a turn look like shorter ones the other way round.
+  constexpr double half_deg = 180.0;
+  double clouds = 360.0 / way.step_deg();
+  if (way.widest_deg() > half_deg) clouds = std::min(clouds, 360.0 / way.widest_deg());
   return static_cast<std::size_t>(std::max(1.0, std::ceil(clouds - may_lack)));
 }
 
@@ -121,16 +127,20 @@ TurnJudgement judge_turns(std::span<const CloudView> clouds) {
   constexpr int min_seen_deg = 200;
   WayRound way;
   std::optional<ViewedArc> last;
+  std::size_t since_last = 0;
   for (const auto& [stamp_ns, arc] : clouds) {
+    const double lasted_s = 1e-9 * static_cast<double>(stamp_ns - clouds.front().stamp_ns);
+    // Not twice round after two of the slowest turns.
+    if (lasted_s > 2.0 * max_turn_s) return {.verdict = TurnVerdict::whole};
+    ++since_last;
     if (!arc) continue;
     if (arc->width_deg >= whole_deg || (last && is_same_view(*last, *arc)))
       return {.verdict = TurnVerdict::whole};
     last = arc;
-    way.add(*arc);
+    way.add(*arc, std::exchange(since_last, 0));
     if (!way.is_twice_round()) continue;
     if (way.seen_deg() < min_seen_deg) return {.verdict = TurnVerdict::whole};
     const std::size_t parts = clouds_per_turn(way);
-    const double lasted_s = 1e-9 * static_cast<double>(stamp_ns - clouds.front().stamp_ns);
     const bool is_slow = 360.0 * lasted_s > max_turn_s * way.turned_deg();
     if (is_slow || parts < 2) return {.verdict = TurnVerdict::whole};
     return {.verdict = TurnVerdict::parts, .clouds_per_turn = parts};
@@ -140,22 +150,37 @@ TurnJudgement judge_turns(std::span<const CloudView> clouds) {
 
 bool TurnRecognition::comes_late(std::int64_t stamp_ns) {
   const std::int64_t step_ns = last_ns_ ? stamp_ns - *last_ns_ : 0;
-  const bool is_late = last_step_ns_ > 0 && 2 * step_ns > 3 * last_step_ns_;
   last_ns_ = stamp_ns;
-  last_step_ns_ = step_ns;
-  return is_late;
+  // Steps from part to part may differ, as where two lidars take turns, but what is usual is so
+  // more than once.
+  std::vector<std::int64_t> sorted = steps_ns_;
+  std::ranges::sort(sorted, std::greater<>());
+  const std::int64_t usual_ns = sorted.empty() ? 0 : sorted[sorted.size() > 2 ? 1 : 0];
+  if (steps_ns_.size() == max_steps) steps_ns_.erase(steps_ns_.begin());
+  steps_ns_.push_back(step_ns);
+  return usual_ns > 0 && 2 * step_ns > 3 * usual_ns;
+}
+
+bool TurnRecognition::is_open_long(std::int64_t stamp_ns) const {
+  constexpr double longest_s = 4.0;
+  return clouds_per_turn_ == 0 &&
+         std::abs(1e-9 * static_cast<double>(stamp_ns - open_since_ns_)) > longest_s;
 }
 
 void TurnRecognition::learn(const CloudView& view) {
   if (comes_late(view.stamp_ns)) run_.clear();
   if (run_.empty() && !view.arc) return;
+  if (!std::exchange(is_open_, true)) open_since_ns_ = view.stamp_ns;
   run_.push_back(view);
   const TurnJudgement judgement = judge_turns(run_);
-  if (judgement.verdict == TurnVerdict::open && run_.size() < max_run) return;
+  const bool is_given_up = run_.size() >= max_run || is_open_long(view.stamp_ns);
+  if (judgement.verdict == TurnVerdict::open && !is_given_up) return;
   run_ = {view};
   if (judgement.verdict == TurnVerdict::parts) {
     same_views_ = 0;
-    clouds_per_turn_ = judgement.clouds_per_turn;
+    // Another number counts once it is found twice: clouds may have been lost unnoticed.
+    const std::size_t before = std::exchange(last_found_, judgement.clouds_per_turn);
+    if (clouds_per_turn_ <= 1 || before == last_found_) clouds_per_turn_ = last_found_;
   } else if (clouds_per_turn_ <= 1 || ++same_views_ >= views_to_withdraw) {
     same_views_ = 0;
     clouds_per_turn_ = 1;

@@ -63,15 +63,24 @@ class TurnRecognition {
   static constexpr std::size_t max_run = 200;
   /// A cloud or two of parts may look like the last one where little is seen.
   static constexpr int views_to_withdraw = 4;
+  static constexpr std::size_t max_steps = 9;
 
   /// Whether clouds got lost before this one, which tells nothing then of the last.
   [[nodiscard]] bool comes_late(std::int64_t stamp_ns);
+  /// Whether so many clouds were lost, or looked like none, that nobody waits for more to tell.
+  [[nodiscard]] bool is_open_long(std::int64_t stamp_ns) const;
 
   std::size_t clouds_per_turn_ = 0;
+  /// Of the last judgement of parts.
+  std::size_t last_found_ = 0;
   /// Views since the last judgement.
   std::vector<CloudView> run_;
   std::optional<std::int64_t> last_ns_;
-  std::int64_t last_step_ns_ = 0;
+  /// The last times from cloud to cloud.
+  std::vector<std::int64_t> steps_ns_;
+  /// Since when clouds were compared without a judgement.
+  std::int64_t open_since_ns_ = 0;
+  bool is_open_ = false;
   int same_views_ = 0;
 };
 

@@ -215,7 +215,7 @@ ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& co
                   accept(cloud, stop);
                   return;
                 }
-                for (Lidar& lidar : lidars_) end_turn(lidar, stop);
+                end_overdue_turns(stop);
                 if (sweeps_ != nullptr) sweeps_->queue_overdue(stop);
               }) {}
 
@@ -312,6 +312,9 @@ void ScanReceiver::take(Lidar& lidar, Scan cloud, const std::string& frame,
     lidar.turns = TurnJoiner(clouds_per_turn_);
     lidar.frame_read = frame;
   }
+  const Clock::time_point now_at = Clock::now();
+  lidar.between_clouds = now_at - lidar.last_cloud;
+  lidar.last_cloud = now_at;
   const std::size_t before = lidar.turns.clouds_per_turn();
   std::vector<Scan> scans = lidar.turns.add(std::move(cloud));
   const std::size_t now = lidar.turns.clouds_per_turn();
@@ -319,6 +322,16 @@ void ScanReceiver::take(Lidar& lidar, Scan cloud, const std::string& frame,
     spdlog::info("clouds on {} are parts of turns: {} of them are a scan ({})", topic_, now,
                  "input.clouds_per_turn: 1 leaves each a scan");
   pass_on(lidar, std::move(scans), stop);
+}
+
+void ScanReceiver::end_overdue_turns(const std::stop_token& stop) {
+  // A simulator may take seconds for what it stamps as a tenth of one.
+  constexpr Clock::duration least = std::chrono::seconds(1);
+  constexpr Clock::duration most = std::chrono::seconds(10);
+  const Clock::time_point now = Clock::now();
+  for (Lidar& lidar : lidars_)
+    if (now - lidar.last_cloud >= std::clamp(2 * lidar.between_clouds, least, most))
+      end_turn(lidar, stop);
 }
 
 void ScanReceiver::end_turn(Lidar& lidar, const std::stop_token& stop) {

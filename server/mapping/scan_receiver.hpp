@@ -88,6 +88,7 @@ class ScanReceiver {
   [[nodiscard]] std::vector<dds::Diagnostic> diagnostics() const;
 
  private:
+  using Clock = std::chrono::steady_clock;
   struct Lidar {
     /// Of several: its number.
     std::size_t index = 0;
@@ -103,6 +104,9 @@ class ScanReceiver {
     std::string frame_read{};
     std::string frame_told{};
     TurnJoiner turns;
+    /// When its last cloud came, and how long after the one before.
+    Clock::time_point last_cloud{};
+    Clock::duration between_clouds{};
     /// Since the last scan.
     bool is_layout_new = false;
   };
@@ -112,6 +116,8 @@ class ScanReceiver {
                ScanQueue& queue, Statistics& statistics);
   [[nodiscard]] static std::vector<Lidar> lidars_on(const ServerConfig& config,
                                                     const std::string& ros_topic);
+  /// Ends the turns of lidars of which nothing follows any more.
+  void end_overdue_turns(const std::stop_token& stop);
   [[nodiscard]] Lidar* lidar_of(const std::string& frame);
   /// Counts the scans that are missing before this one.
   void count_losses(const eprosima::fastrtps::rtps::SampleIdentity& scan);

@@ -136,5 +136,15 @@ TEST(JoinedTurns, OfFilesHaveTheirFirstPartsPosesAndTenTurnsASecond) {
   EXPECT_DOUBLE_EQ(truth->at(2).T_map_lidar.translation().x(), 4.0);
 }
 
+TEST(JoinedTurns, OfManyFilesWithoutStampsAreFound) {
+  const ScratchFolder folder;
+  for (int k = 0; k < 130; ++k)
+    write_kitti_bin(folder.path() / (std::to_string(100 + k) + ".bin"), wall(30.0 * k, 30.0));
+  ScanDataset dataset(folder.path());
+  dataset.join_turns();
+  EXPECT_EQ(dataset.clouds_per_turn(), 12U);
+  EXPECT_THAT(dataset.read(1).scan.points_lidar, SizeIs(8 * 360));
+}
+
 }  // namespace
 }  // namespace stillmap

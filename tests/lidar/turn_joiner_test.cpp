@@ -128,6 +128,8 @@ INSTANTIATE_TEST_SUITE_P(All, TurnsInParts,
                                          PartsCase{"Thirds", 120.0, 120.0, 3},
                                          PartsCase{"Quarters", -90.0, 90.0, 4},
                                          PartsCase{"Twelfths", 30.0, 30.0, 12},
+                                         PartsCase{"TwelfthsOfBeamsOutOfLine", 30.0, 38.0, 12},
+                                         PartsCase{"SixthsOfBeamsOutOfLine", 60.0, 76.0, 6},
                                          PartsCase{"SeamThatWanders", 200.0, 200.0, 2},
                                          PartsCase{"SmallPartsThatWander", 110.0, 110.0, 3},
                                          PartsCase{"TwoThirds", 240.0, 240.0, 2},
@@ -148,6 +150,43 @@ TEST(TurnJoiner, JoinsPartsOfWhatTheRobotHidesInPart) {
     }
     EXPECT_THAT(joined(halves).stamps_ms, ElementsAre(0, 100, 200, 300, 400, 500)) << seam_deg;
   }
+}
+
+TEST(TurnJoiner, CountsPartsThatTheRobotHides) {
+  // The rear 90 degrees: of twelve parts three show nothing.
+  TurnJoiner joiner;
+  std::size_t scans = 0;
+  for (int k = 0; k < 120; ++k) {
+    Scan part = cloud_of_arc(8.0 * k, 17.0 + 30.0 * k, 30.0);
+    std::erase_if(part.points_lidar, [](const Eigen::Vector3f& p) { return p.x() < -7.07F; });
+    part.ring.clear();
+    scans += joiner.add(part).size();
+  }
+  EXPECT_EQ(joiner.clouds_per_turn(), 12U);
+  EXPECT_EQ(scans, 10U);
+}
+
+TEST(TurnJoiner, NeverKeepsCloudsForLong) {
+  const auto longest_wait_ms = [](auto cloud_at) {
+    TurnJoiner joiner;
+    double longest_ms = 0.0;
+    for (int k = 0; k < 300; ++k) {
+      const Scan cloud = cloud_at(k);
+      for (const Scan& scan : joiner.add(cloud))
+        longest_ms =
+            std::max(longest_ms, static_cast<double>(cloud.stamp_ns - scan.stamp_ns) / turn_ms);
+    }
+    return longest_ms;
+  };
+  // Two lidars that take turns, not in the middle of each other's.
+  EXPECT_LE(longest_wait_ms([](int k) {
+              return cloud_of_arc(50.0 * k - 20.0 * (k % 2), 17.0 + 180.0 * k, 180.0);
+            }),
+            500.0);
+  // A few things near the lidar, and then nothing.
+  EXPECT_LE(
+      longest_wait_ms([](int k) { return cloud_of_arc(100.0 * k, 0.0, k == 0 ? 40.0 : 2.0); }),
+      2200.0);
 }
 
 TEST(TurnJoiner, LetsWholeTurnsPassAtOnce) {

@@ -159,7 +159,8 @@ std::string describe(const evaluation::MapCleaningScore& score) {
 ExitCode run(const EvaluateMapArguments& arguments) {
   end_cleanly_when_stopped();
   const SavedMap map = read_map_file(arguments.map);
-  const ScanDataset dataset(arguments.truth);
+  ScanDataset dataset(arguments.truth);
+  dataset.join_turns();
   require_semantic_kitti_labels(dataset);
   const evaluation::MapTruth truth =
       true_map(arguments, dataset, poses_for_truth(arguments, dataset, map));

@@ -223,7 +223,8 @@ void write_picture(const EvaluateSegmentationArguments& arguments, const ScanDat
 
 SequenceScore run_model(const EvaluateSegmentationArguments& arguments, std::size_t number) {
   const std::string& sequence = arguments.truth[number];
-  const ScanDataset dataset(sequence);
+  ScanDataset dataset(sequence);
+  dataset.join_turns();
   require_semantic_kitti_labels(dataset);
   const std::size_t scans = arguments.range.end(dataset) - arguments.range.first;
   const std::unique_ptr<Segmenter> labels =

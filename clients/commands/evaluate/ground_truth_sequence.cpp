@@ -92,6 +92,7 @@ GroundTruthSequence open_simulated(const SimulatedDrive& drive) {
 
 GroundTruthSequence open_recorded(const std::string& name) {
   const auto dataset = std::make_shared<ScanDataset>(name);
+  dataset->join_turns();
   GroundTruthSequence sequence;
   sequence.name = name;
   sequence.sensor = dataset->suggested_sensor();

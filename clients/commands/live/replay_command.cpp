@@ -386,7 +386,9 @@ bool is_success(const ReplayArguments& arguments, const ReplayOutcome& outcome) 
   if (arguments.lossless && !is_complete) {
     std::cerr << "stillmap: the replay was to be lossless, but the server mapped " << mapped
               << " of " << published << " scans, and " << outcome.poses.size()
-              << " poses came back; 'stillmap status' counts why. " << no_scan_twice << "\n";
+              << " poses came back; 'stillmap status' counts why. " << no_scan_twice
+              << " A server joins clouds that are parts of a turn, unless its file has "
+                 "'input: {clouds_per_turn: 1}'.\n";
     return false;
   }
   const bool were_for_it = outcome.server_takes_topic || outcome.server->dropped > 0;
