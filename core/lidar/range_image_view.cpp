@@ -94,9 +94,10 @@ constexpr int min_columns = 32;
 /// between two beams: 76 degrees from facing the lidar.
 constexpr float max_slope = 4.0F;
 
-/// How far below the top of its row, in 256ths of it. The outermost beams may lie beyond.
-std::uint8_t share_of_row(float row, float top) {
-  return static_cast<std::uint8_t>(std::clamp(256.0F * (row - top), 0.0F, 255.0F));
+/// How far from the first edge of its row or column, in 256ths of it. The outermost beams may lie
+/// beyond.
+std::uint8_t share_of_pixel(float at, float edge) {
+  return static_cast<std::uint8_t>(std::clamp(256.0F * (at - edge), 0.0F, 255.0F));
 }
 
 }  // namespace
@@ -110,18 +111,22 @@ RangeImageView::RangeImageView(const Scan& scan, std::span<const SemanticClass> 
       rows_per_rad_(static_cast<float>(sensor.rings / (sensor.fov_up - sensor.fov_down))),
       columns_beside_(columns_for_half_a_row(rows_per_rad_, columns_)),
       pixels_(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(columns_), 0.0F),
-      below_row_top_(pixels_.size()) {
+      below_row_top_(pixels_.size()),
+      in_column_(pixels_.size()) {
   move_to(T_map_lidar);
   std::vector<Return> returns(scan.size());
   measure(scan, labels, returns);
   // A lidar that fires less often than it has columns leaves pixels empty between its shots.
   if (const float between = columns_a_shot(); between > max_columns_a_shot) {
+    const int full_columns = columns_;
     columns_ = std::max(
         min_columns, static_cast<int>(static_cast<float>(columns_) / (between * shots_a_column)));
     // A shot may be anywhere in its column: one more is asked to either side.
     columns_beside_ = columns_for_half_a_row(rows_per_rad_, columns_) + 1;
     pixels_.assign(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(columns_), 0.0F);
     below_row_top_.assign(pixels_.size(), 0);
+    in_column_.assign(pixels_.size(), 0);
+    full_column_ = std::min(256, 256 * columns_ / full_columns);
     measure(scan, labels, returns);
   }
   if (is_thin != nullptr) *is_thin = thin_ones(returns);
@@ -175,6 +180,7 @@ float RangeImageView::columns_a_shot() const {
 void RangeImageView::fill(std::span<const Return> returns, std::span<const SemanticClass> labels) {
   float* const pixels = pixels_.data();
   std::uint8_t* const below_row_top = below_row_top_.data();
+  std::uint8_t* const in_column = in_column_.data();
   for (std::size_t i = 0; i < returns.size(); ++i) {
     const Return& found = returns[i];
     if (found.pixel == none) continue;
@@ -186,6 +192,7 @@ void RangeImageView::fill(std::span<const Return> returns, std::span<const Seman
     const float signed_range = may_move ? found.range_m : -found.range_m;
     pixels[found.pixel] = is_nearer ? signed_range : old;
     below_row_top[found.pixel] = is_nearer ? found.below_row_top : old_below;
+    in_column[found.pixel] = is_nearer ? found.in_column : in_column[found.pixel];
   }
 }
 
@@ -242,7 +249,9 @@ RangeImageView::RowRange RangeImageView::project(std::span<const Eigen::Vector3f
   const Batch row = (fov_up_ - fast_atan2(z, across)) * rows_per_rad_;
   const Batch column = 0.5F * (1.0F - fast_atan2(y, x) / pi) * static_cast<float>(columns_);
   const WholeBatch r = whole(row, static_cast<float>(rows_ - 1));
-  const WholeBatch pixel = r * columns_ + whole(column, static_cast<float>(columns_ - 1));
+  const WholeBatch c = whole(column, static_cast<float>(columns_ - 1));
+  const WholeBatch pixel = r * columns_ + c;
+  const WholeBatch in_column = whole(256.0F * (column - c.cast<float>()), 255.0F);
   const WholeBatch below_row_top = whole(256.0F * (row - r.cast<float>()), 255.0F);
   // Half a row of slack: the outermost beams look along the edge of the field of view.
   const float last_row = static_cast<float>(rows_) + 0.5F;
@@ -251,7 +260,8 @@ RangeImageView::RowRange RangeImageView::project(std::span<const Eigen::Vector3f
     const auto k = static_cast<Eigen::Index>(i);
     const bool is_seen = (range_m[k] > 0.0F) & (row[k] >= -0.5F) & (row[k] < last_row);
     returns[i] = {is_seen ? static_cast<std::uint32_t>(pixel[k]) : none, range_m[k],
-                  static_cast<std::uint8_t>(below_row_top[k])};
+                  static_cast<std::uint8_t>(below_row_top[k]),
+                  static_cast<std::uint8_t>(in_column[k])};
     rows.first = is_seen ? std::min(rows.first, row[k]) : rows.first;
     rows.last = is_seen ? std::max(rows.last, row[k]) : rows.last;
   }
@@ -266,9 +276,12 @@ std::optional<RangeImageView::Direction> RangeImageView::direction_of(
   const bool is_seen = range_m > 0.0F && row >= seen_rows_.first && row <= seen_rows_.last;
   if (!is_seen) return std::nullopt;
   const int r = std::clamp(static_cast<int>(row), 0, rows_ - 1);
-  const int c = std::clamp(static_cast<int>(turn * static_cast<float>(columns_)), 0, columns_ - 1);
-  return Direction{
-      .row = r, .column = c, .below_row_top = share_of_row(row, static_cast<float>(r))};
+  const float column = turn * static_cast<float>(columns_);
+  const int c = std::clamp(static_cast<int>(column), 0, columns_ - 1);
+  return Direction{.row = r,
+                   .column = c,
+                   .below_row_top = share_of_pixel(row, static_cast<float>(r)),
+                   .in_column = share_of_pixel(column, static_cast<float>(c))};
 }
 
 float RangeImageView::next_range_m(int row, int column, int step) const {
@@ -356,6 +369,12 @@ bool RangeImageView::lies_on_surface(const Observation& point, float tolerance_m
          goes_on(at.row, (at.column + columns_ - 1) % columns_, column_rad) ||
          (at.row > 0 && goes_on(at.row - 1, at.column, row_rad)) ||
          (at.row + 1 < rows_ && goes_on(at.row + 1, at.column, row_rad));
+}
+
+bool RangeImageView::has_beam_beside(const Observation& point) const {
+  if (full_column_ == 256) return true;
+  const Direction& at = point.at;
+  return std::abs(in_column_[index(at.row, at.column)] - at.in_column) <= full_column_;
 }
 
 bool RangeImageView::has_beam_near(const Observation& point, float distance_m) const {

@@ -31,6 +31,8 @@ class RangeImageView {
   struct Direction {
     int row, column;
     std::uint8_t below_row_top;
+    /// How far right of its left edge, in 256ths of the column.
+    std::uint8_t in_column;
   };
   /// What was measured in the direction of a point.
   struct Observation {
@@ -58,6 +60,11 @@ class RangeImageView {
   /// [m], up or down, and not only on either side of it.
   [[nodiscard]] bool has_beam_near(const Observation& point, float distance_m) const;
 
+  /// Whether the beam that measured something in the direction of a point passes it no farther to
+  /// the side than columns of a full image are wide: between the shots of a lidar that fires seldom
+  /// may be a pole. Always, where columns were not made wider.
+  [[nodiscard]] bool has_beam_beside(const Observation& point) const;
+
   [[nodiscard]] const Eigen::Vector3f& origin_map() const { return origin_map_; }
 
   /// Replaces the pose.
@@ -70,6 +77,7 @@ class RangeImageView {
     std::uint32_t pixel = 0;
     float range_m = 0.0F;
     std::uint8_t below_row_top = 0;
+    std::uint8_t in_column = 0;
   };
   /// The nearest return up or down from a pixel.
   struct Beside {
@@ -125,6 +133,10 @@ class RangeImageView {
   std::vector<float> pixels_;
   /// Where in its row it was measured, in 256ths from the top: a row may have several beams.
   std::vector<std::uint8_t> below_row_top_;
+  /// Where in its column, in 256ths from the left.
+  std::vector<std::uint8_t> in_column_;
+  /// Width of a column before it was fitted to the shots, in 256ths of a column now; 256: as now.
+  int full_column_ = 256;
 };
 
 }  // namespace stillmap

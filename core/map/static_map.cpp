@@ -174,6 +174,7 @@ bool StaticMap::State::sees_through(const RangeImageView& view, const Eigen::Vec
   const double margin_m = std::max(config.clearing_margin_m, config.voxel_size_m);
   const double beyond_m = range_m + margin_m + config.clearing_margin_share * range_m;
   if (!observation || !view.sees_past(*observation, static_cast<float>(beyond_m))) return false;
+  if (!view.has_beam_beside(*observation)) return false;
   // A rail lies between two beams most of the time, and fills less than half of its voxel. A beam
   // above or below it may be that near, too: where labels are sure it takes more than one.
   const double near_voxels = thin == Thin::by_labels ? 0.25 : 0.2;

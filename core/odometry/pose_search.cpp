@@ -367,7 +367,7 @@ std::optional<Eigen::Isometry3d> pose_to_last_scan(const FeatureSets& features, 
     const PoseTangent off = boxminus(T_map_lidar, last.T_map_lidar);
     const bool is_at_rest =
         off.head<3>().norm() < error_m && off.tail<3>().norm() < coarse_error_rad;
-    return is_at_rest ? last.T_map_lidar : T_map_lidar;
+    return is_at_rest ? last.T_map_lidar : moved_level(last.T_map_lidar, T_map_lidar);
   };
   if (coarse.health == OdometryHealth::good && coarse.upright_fit >= min_coarse_upright_fit)
     return moved(coarse.T_map_lidar, coarse_error_m);

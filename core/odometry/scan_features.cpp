@@ -154,6 +154,7 @@ double least_share_left(const ScanInParts& parts, const OdometryConfig& config) 
   Eigen::Matrix2d all = Eigen::Matrix2d::Zero();
   for (const std::uint32_t i : parts.features.upright_points) {
     if (!not_moving(i) || is_ground(parts.labels.classes[i])) continue;
+    if (parts.scan.points_lidar[i].norm() > parts.surfaces_reach_m) continue;
     const Eigen::Matrix2d information = horizontal_information(parts.upright_tangents[i]);
     all += information;
     if (fixed(i)) left += information;

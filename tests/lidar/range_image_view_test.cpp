@@ -191,6 +191,23 @@ TEST(RangeImageView, HasNoHolesBetweenTheShotsOfALidarThatFiresSeldom) {
   }
 }
 
+TEST(RangeImageView, SaysWhetherABeamPassesBesideAPointBetweenShotsOfALidarThatFiresSeldom) {
+  const RangeImageView dense = view_of_few_shots(1, SemanticClass::building);
+  const RangeImageView sparse = view_of_few_shots(5, SemanticClass::building);
+  int passed = 0;
+  for (int column = 0; column < columns; ++column) {
+    const Eigen::Vector3f point = point_in(rings / 2, column, 0.5, 5.0);
+    EXPECT_TRUE(dense.has_beam_beside(*dense.observe(point))) << column;
+    const bool is_near = sparse.has_beam_beside(*sparse.observe(point));
+    passed += is_near ? 1 : 0;
+    // Shots are in columns 0, 5, 10, ..
+    if (is_near) {
+      EXPECT_TRUE(column % 5 <= 1 || column % 5 == 4) << column;
+    }
+  }
+  EXPECT_GT(passed, columns / 5);
+}
+
 /// Along x, 4 m to the left: its range changes by 6 m from one shot to the next, 20 m ahead.
 TEST(RangeImageView, KnowsAWallThatItSeesAtAGrazingAngle) {
   Scan scan;
