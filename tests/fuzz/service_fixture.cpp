@@ -66,8 +66,8 @@ ServiceFixture::ServiceFixture()
               },
           .query_occupancy = [this](const OccupancyQuery& query) { return octree_.answer(query); },
           .encode_octomap =
-              [this](bool binary) {
-                return server::EncodedOctree{.data = octree_.encode(binary), .stamp_ns = 0};
+              [this](OctomapEncoding encoding) {
+                return server::EncodedOctree{.data = octree_.encode(encoding), .stamp_ns = 0};
               },
           .traversability = traversability_cache_,
           .grid_provider = grid_provider_,
