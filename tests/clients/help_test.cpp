@@ -131,7 +131,8 @@ TEST_F(HelpTest, WhatSaysNothingOfLabelsInFilesIsRefused) {
   for (const std::string option : {"--model street", "--drive-votes off", "--picture x.png"}) {
     const ProcessResult result = run("evaluate segmentation --truth x --predictions y " + option);
     EXPECT_EQ(result.exit_code, 2) << option;
-    EXPECT_THAT(result.err, HasSubstr("excludes --predictions")) << option;
+    EXPECT_THAT(result.err,
+                HasSubstr("--predictions excludes " + option.substr(0, option.find(' '))));
   }
 }
 

@@ -110,7 +110,7 @@ TEST(RangeImageHistory, LookFromAnotherPlaceAgrees) {
 }
 
 TEST(RangeImageHistory, MarginKeepsANearbySurfaceFromBeingFree) {
-  EXPECT_EQ(observation(with_car(10.3), with_car(10.0), rear_at_10m), PastObservation::unknown);
+  EXPECT_EQ(observation(with_car(10.4), with_car(10.0), rear_at_10m), PastObservation::unknown);
   EXPECT_EQ(observation(with_car(11.5), with_car(10.0), rear_at_10m), PastObservation::free);
 }
 

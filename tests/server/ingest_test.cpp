@@ -178,10 +178,12 @@ TEST(ToldLidar, CloudsOfAnotherFrameAreCounted) {
   }
 }
 
-/// What the status says of clouds, when so many scans came to which `change` was done.
+/// What the status says of clouds, when so many scans came to which `change` was done. `input`: the
+/// section's delivery, and what follows it.
 template <typename Change>
-std::vector<std::string> told_of(Change change, int scans, const std::string& more = "") {
-  const ServiceSetup setup("every", "save_period_s: 3600", more);
+std::vector<std::string> told_of(Change change, int scans, const std::string& more = "",
+                                 const std::string& input = "every") {
+  const ServiceSetup setup(input, "save_period_s: 3600", more);
   const ServerProcess server(setup.server_arguments());
   Client client(setup.client());
   client.wait_for_server(patience);
@@ -223,7 +225,7 @@ TEST(LiveClouds, OfHalfTurnsThatAreNotJoinedAreToldByWhereTheyLook) {
     for (Eigen::Vector3f& p : scan.points_lidar)
       if ((p.y() < 0.0F) == (i % 2 == 0)) p.setConstant(NAN);
   };
-  EXPECT_THAT(told_of(halves, 102, "input: {clouds_per_turn: 1}"),
+  EXPECT_THAT(told_of(halves, 102, "", "every, clouds_per_turn: 1"),
               testing::Contains(testing::HasSubstr("parts of one turn")));
 }
 
