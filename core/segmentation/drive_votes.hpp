@@ -38,8 +38,8 @@ struct DriveVoteConfig {
 /// votes for its class with its confidence, squared: the sure ones decide. Points take the class
 /// that has most votes round them, their own one of several, else the lowest. Their confidence is
 /// then its share of all votes, where it is another class. Points without a class neither vote nor
-/// change, nor does a scan that is alone. Memory is that of twice `scans_each_way` scans. Not
-/// thread-safe.
+/// change; where no other scan of its window votes, a scan keeps its labels. Memory is that of
+/// twice `scans_each_way` scans. Not thread-safe.
 class DriveVotes {
  public:
   /// Throws std::invalid_argument with `config.faults()`.

@@ -313,7 +313,7 @@ void ScanReceiver::take(Lidar& lidar, Scan cloud, const std::string& frame,
     lidar.frame_read = frame;
   }
   const Clock::time_point now_at = Clock::now();
-  lidar.between_clouds = now_at - lidar.last_cloud;
+  if (lidar.last_cloud) lidar.between_clouds = now_at - *lidar.last_cloud;
   lidar.last_cloud = now_at;
   const std::size_t before = lidar.turns.clouds_per_turn();
   std::vector<Scan> scans = lidar.turns.add(std::move(cloud));
@@ -330,7 +330,8 @@ void ScanReceiver::end_overdue_turns(const std::stop_token& stop) {
   constexpr Clock::duration most = std::chrono::seconds(10);
   const Clock::time_point now = Clock::now();
   for (Lidar& lidar : lidars_)
-    if (now - lidar.last_cloud >= std::clamp(2 * lidar.between_clouds, least, most))
+    if (lidar.last_cloud &&
+        now - *lidar.last_cloud >= std::clamp(2 * lidar.between_clouds, least, most))
       end_turn(lidar, stop);
 }
 

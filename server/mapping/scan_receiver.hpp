@@ -104,8 +104,8 @@ class ScanReceiver {
     std::string frame_read{};
     std::string frame_told{};
     TurnJoiner turns;
-    /// When its last cloud came, and how long after the one before.
-    Clock::time_point last_cloud{};
+    /// When its last cloud came, and how long after the one before, where there was one.
+    std::optional<Clock::time_point> last_cloud{};
     Clock::duration between_clouds{};
     /// Since the last scan.
     bool is_layout_new = false;
