@@ -18,7 +18,8 @@ FRESH_MS = 300.0
 FRESH_AT_THE_END_MS = 1000.0
 MEMORY_GROWTH_MB = 100.0
 SLOWER_MS = 50.0
-OUTAGE_S = 10.0
+# Well under half of the drive: most poses are fresh.
+OUTAGE_S = 8.0
 
 # Name, scenario, longest gap between two poses [s]; None where none are taken.
 ALL = [
@@ -26,7 +27,7 @@ ALL = [
     ("1 % loss, wifi", scenarios.losses(0.01), 2.0),
     ("5 % loss, wifi", scenarios.losses(0.05), 2.0),
     ("10 Mbit/s, wifi", scenarios.slow_link, 2.0),
-    ("10 s outage, wifi", scenarios.outage, OUTAGE_S + 5.0),
+    ("8 s outage, wifi", scenarios.outage, OUTAGE_S + 5.0),
     ("no multicast, peers", scenarios.peers_without_multicast, 2.0),
     ("no multicast, discovery server", scenarios.discovery_server, 2.0),
     ("TCP only, 1 % loss, wan", scenarios.tcp_only, 2.0),

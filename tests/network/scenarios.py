@@ -125,7 +125,7 @@ def outage(setup):
     def cut_the_cable(play, office):
         time.sleep(3)
         office.cut()
-        time.sleep(10)
+        time.sleep(8)
         office.mend()
     return drive(setup, ["--dds-profile", "wifi"], during=cut_the_cable)
 
