@@ -139,7 +139,8 @@ std::optional<MappedScan> Mapper::process(
   if (!config_.prepare.deskew) scan.time_offset_s.clear();
   const SweepTimes sweep = sweep_times(scan, config_.sensor.period_s);
   const std::int64_t middle_ns = scan.stamp_ns + std::llround(sweep.middle_s * 1e9);
-  if (trajectory_.empty() || scans_to_confirm_ > 0) odometry_.expect_first_scan(middle_ns);
+  if (trajectory_.empty() || scans_to_confirm_ > 0)
+    odometry_.expect_first_scan(middle_ns, middle_ns - scan.stamp_ns);
   const std::optional<Scan> with_times = hands_out_scans_ ? std::optional(scan) : std::nullopt;
   const std::optional<InertialMotion> inertial = inertial_motion(scan.stamp_ns, sweep);
   odometry_.sweep_motion(sweep, inertial).move_to_middle(scan, sweep);

@@ -217,6 +217,12 @@ class Mapper {
   /// near them. Throws std::invalid_argument for voxels or tiles of another size than configured,
   /// and is then as it was.
   void resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidence = {});
+  /// After that, where the next scan follows soon on those that the map was made of: the lidar
+  /// moved so between their last two poses, and goes on as it did. Without this the first scan of a
+  /// lidar that turns while it moves is taken for one that stood, and a fast one is not found.
+  void go_on_from(const StampedPose& before_last, const StampedPose& last) {
+    odometry_.go_on_from(before_last, last);
+  }
   /// The same with a static map that resumed a stored one already, elsewhere: cannot fail, and
   /// takes as long for a large map as for a small one. Returns the map until now, for another
   /// thread to free.

@@ -156,9 +156,27 @@ void Odometry::begin_map(const std::optional<double>& reach_m) {
   state = std::move(next);
 }
 
-void Odometry::expect_first_scan(std::int64_t stamp_ns) {
+void Odometry::go_on_from(const StampedPose& before_last, const StampedPose& last) {
+  State& state = *state_;
+  assert(!state.started);
+  const double interval_s = 1e-9 * static_cast<double>(last.stamp_ns - before_last.stamp_ns);
+  if (interval_s <= 0.0 || interval_s > max_prediction_s) return;
+  const RegisteredScan from{.features = {}, .T_map_lidar = before_last.T_map_lidar};
+  if (!is_reachable(from, last.T_map_lidar, interval_s, false, state.sensor.motion_limits)) return;
+  state.last.motion = before_last.T_map_lidar.inverse() * last.T_map_lidar;
+  state.intervals = ScanIntervals(state.sensor.period_s);
+  state.intervals.begin(before_last.stamp_ns);
+  state.intervals.add(last.stamp_ns);
+  state.last.interval_s = state.intervals.last_interval_s();
+  state.intervals_are_of_stamps = true;
+  state.goes_on = true;
+}
+
+void Odometry::expect_first_scan(std::int64_t stamp_ns, std::int64_t after_stamp_ns) {
   State& state = *state_;
   if (state.started || state.last.interval_s <= 0.0) return;
+  if (std::exchange(state.intervals_are_of_stamps, false))
+    state.intervals.set_clock(after_stamp_ns);
   const double since_last_s = state.intervals.stamped_since_last_s(stamp_ns);
   if (since_last_s > 0.0 && since_last_s <= max_prediction_s) return;
   state.last = {};

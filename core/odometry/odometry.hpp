@@ -11,6 +11,7 @@
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/prepare.hpp"
 #include "core/lidar/sensor_model.hpp"
+#include "core/lidar/trajectory.hpp"
 #include "core/odometry/feature_map.hpp"
 #include "core/odometry/odometry_config.hpp"
 #include "core/odometry/odometry_state.hpp"
@@ -82,9 +83,13 @@ class Odometry {
   /// scan that follows at once. That one is looked for up to `reach_m` from its prior, where that
   /// is given, instead of OdometryConfig::first_reach_m.
   void begin_map(const std::optional<double>& reach_m = std::nullopt);
-  /// Where the first scan of a map comes at this time: forgets a velocity of too long ago, or of
-  /// another clock.
-  void expect_first_scan(std::int64_t stamp_ns);
+  /// Before the first scan of a map: the lidar moved from one of these poses, of two scans at their
+  /// stamps, to the other, and goes on as it did. Nothing is taken from what no lidar does, or from
+  /// poses that are too long apart to tell a velocity.
+  void go_on_from(const StampedPose& before_last, const StampedPose& last);
+  /// Where the first scan of a map comes, in the middle of a sweep that is so long after its stamp:
+  /// forgets a velocity of too long ago, or of another clock.
+  void expect_first_scan(std::int64_t stamp_ns, std::int64_t after_stamp_ns = 0);
 
  private:
   struct State;

@@ -180,6 +180,8 @@ struct Odometry::State {
   bool has_prior_map = false;
   /// The lidar moves as it did in the map before this one.
   bool goes_on = false;
+  /// Times of the scans before it are those of their stamps, not yet of the middles of sweeps.
+  bool intervals_are_of_stamps = false;
   /// The last motion was none of the robot: a place was found again, or a prior corrected itself.
   bool has_jumped = false;
   /// What the last scan used of objects that could move, and whether the rest denied it since these

@@ -10,6 +10,7 @@
 #include "core/dataset/scan_dataset.hpp"
 #include "core/mapper.hpp"
 #include "core/segmentation/segmenter.hpp"
+#include "core/simulation/simulation.hpp"
 #include "tests/odometry/poses.hpp"
 #include "tests/server/room_scans.hpp"
 
@@ -186,6 +187,41 @@ TEST(ResumedMap, IsNotBegunByALidarThatWasFoundInTheMapOfThisRun) {
   EXPECT_FALSE(mapper.begins_map());
   mapper.reset(7);
   EXPECT_TRUE(mapper.begins_map());
+}
+
+/// 12 m/s, and turning.
+simulation::SimulationConfig fast_drive() {
+  simulation::SimulationConfig config;
+  config.sensor = vlp_16();
+  config.scans = 40;
+  config.rolling = true;
+  config.motion = simulation::LidarMotion::hard_turns;
+  return config;
+}
+
+// One that is taken to have stood is bent by more than a metre, and found nowhere. The robot then
+// leaves what is known behind.
+TEST(ResumedMap, ALidarThatGoesOnFastIsFoundAtOnce) {
+  const simulation::Simulation drive(fast_drive());
+  MapperConfig config;
+  config.sensor = vlp_16();
+  Mapper uninterrupted(config, std::make_unique<NullSegmenter>());
+  constexpr int stopped_at = 30;
+  for (int k = 0; k < stopped_at; ++k) ASSERT_TRUE(uninterrupted.process(drive.scan(k).scan));
+  Mapper mapper(config, std::make_unique<NullSegmenter>());
+  mapper.resume(*uninterrupted.map_snapshot());
+  const StampedPose last = uninterrupted.trajectory().back();
+  mapper.go_on_from(uninterrupted.trajectory()[stopped_at - 2], last);
+  for (int k = stopped_at; k < fast_drive().scans; ++k) {
+    const auto expected = uninterrupted.process(drive.scan(k).scan);
+    const auto prior = k == stopped_at ? std::optional(last.T_map_lidar) : std::nullopt;
+    const auto mapped = mapper.process(drive.scan(k).scan, prior);
+    ASSERT_TRUE(expected && mapped);
+    EXPECT_EQ(mapped->odometry.health, OdometryHealth::good) << k;
+    EXPECT_LT(test::translation_error(mapped->odometry.T_map_lidar, expected->odometry.T_map_lidar),
+              0.05)
+        << k;
+  }
 }
 
 }  // namespace

@@ -139,6 +139,29 @@ TEST_F(OdometrySequence, ForgetsAVelocityOfAnotherTimeInAnotherMap) {
   }
 }
 
+TEST_F(OdometrySequence, GoesOnAsItIsToldThatItMoved) {
+  const Eigen::Isometry3d motion = level_pose(1.2, 0.0, 0.05);
+  const StampedPose before_last{700'000'000, level_pose(3.0, 1.0, 0.3)};
+  const auto motion_after = [&](std::int64_t last_ns, const Eigen::Isometry3d& moved,
+                                std::int64_t first_scan_ns) {
+    Odometry odometry(OdometryConfig{}, test::test_lidar());
+    odometry.go_on_from(before_last, {last_ns, before_last.T_map_lidar * moved});
+    // In the middle of its sweep.
+    odometry.expect_first_scan(first_scan_ns + 50'000'000, 50'000'000);
+    return odometry.motion_during(0.1);
+  };
+  expect_near(motion_after(800'000'000, motion, 900'000'000), motion, 1e-9, 1e-9);
+  // A scan was left out.
+  expect_near(motion_after(900'000'000, motion * motion, 1'000'000'000), motion, 1e-9, 1e-9);
+  const auto nothing = Eigen::Isometry3d::Identity();
+  const Eigen::Isometry3d jump = level_pose(30.0, 0.0, 0.0);
+  expect_near(motion_after(800'000'000, jump, 900'000'000), nothing, 1e-9, 1e-9);
+  expect_near(motion_after(700'000'000, motion, 900'000'000), nothing, 1e-9, 1e-9);
+  expect_near(motion_after(1'800'000'000, motion, 1'900'000'000), nothing, 1e-9, 1e-9);
+  expect_near(motion_after(800'000'000, motion, 1'900'000'000), nothing, 1e-9, 1e-9);
+  expect_near(motion_after(800'000'000, motion, 100'000'000), nothing, 1e-9, 1e-9);
+}
+
 TEST_F(OdometrySequence, PredictsConstantVelocityUpToASecond) {
   Odometry odometry(OdometryConfig{}, test::test_lidar());
   EXPECT_TRUE(odometry.motion_during(0.1).isApprox(Eigen::Isometry3d::Identity()));

@@ -11,6 +11,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "core/map/map_id.hpp"
 #include "core/map/storage/map_file.hpp"
+#include "core/odometry/se3.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -49,6 +50,8 @@ class MappingRun {
   void resume(RunState earlier) {
     mapper_.resume(earlier.map.view, earlier.map.tile_evidence);
     earlier_ = earlier.map.trajectory.to_vector();
+    if (earlier_.size() > 1)
+      mapper_.go_on_from(lidar_pose(earlier_[earlier_.size() - 2]), lidar_pose(earlier_.back()));
     if (loops_) loops_->resume(earlier.next_scan, earlier.scan_of_pose.size());
     result_.scan_of_pose = std::move(earlier.scan_of_pose);
     result_.resumed_at_scan = earlier.next_scan;
@@ -83,9 +86,9 @@ class MappingRun {
       mapper_.add(sample);
     times_.begin();
     std::optional<Eigen::Isometry3d> T_map_lidar_first;
-    // Until the lidar is found in the earlier map, every scan is looked for where that ended.
+    // Until the lidar is found in the earlier map, every scan is looked for where that leads.
     if (!earlier_.empty() && !is_registered_) {
-      T_map_lidar_first = earlier_.back().T_map_lidar * T_body_lidar_;
+      T_map_lidar_first = lidar_pose_at(frame->scan.stamp_ns);
     }
     const std::optional<MappedScan> mapped =
         mapper_.process(std::move(frame->scan), T_map_lidar_first);
@@ -134,6 +137,24 @@ class MappingRun {
   }
 
  private:
+  [[nodiscard]] StampedPose lidar_pose(const StampedPose& body) const {
+    return {body.stamp_ns, body.T_map_lidar * T_body_lidar_};
+  }
+
+  /// Where the lidar is when it has gone on from the end of the earlier run as it moved there, for
+  /// a second at most.
+  [[nodiscard]] Eigen::Isometry3d lidar_pose_at(std::int64_t stamp_ns) const {
+    const StampedPose last = lidar_pose(earlier_.back());
+    if (earlier_.size() < 2) return last.T_map_lidar;
+    const StampedPose before_last = lidar_pose(earlier_[earlier_.size() - 2]);
+    constexpr double max_ns = 1e9;
+    const auto interval_ns = static_cast<double>(last.stamp_ns - before_last.stamp_ns);
+    const auto since_ns = static_cast<double>(stamp_ns - last.stamp_ns);
+    if (interval_ns <= 0.0 || interval_ns > max_ns || since_ns <= 0.0) return last.T_map_lidar;
+    return last.T_map_lidar * scaled_motion(before_last.T_map_lidar.inverse() * last.T_map_lidar,
+                                            std::min(since_ns, max_ns) / interval_ns);
+  }
+
   /// Where the stamps were set back, the mapper drops the poses of times to come.
   void forget_dropped_poses() {
     const std::size_t before = earlier_.size() + mapper_.trajectory().size() - 1;

@@ -1,0 +1,36 @@
+#include <filesystem>
+
+#include "tests/clients/command_test.hpp"
+
+namespace stillmap::test {
+namespace {
+
+using ResumedRunTest = CommandTest;
+
+// Its first scan has nothing before it that would tell how it moves.
+TEST_F(ResumedRunTest, GoesOnWhereAFastLidarWasInItsTurn) {
+  const ProcessResult simulated = run("simulate " + path("drive") +
+                                      " --scans 42 --sensor vlp_16 --rolling --motion hard_turns");
+  ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
+  const std::string map = "map " + path("drive") +
+                          " --labels none --loops off --strict --save-period 0.0001 --json --out ";
+  const ProcessResult whole = run(map + path("whole"));
+  ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  // A damaged file stops a run.
+  const std::filesystem::path scan = folder_ / "drive/velodyne/000030.bin";
+  std::filesystem::copy_file(scan, folder_ / "scan");
+  std::filesystem::resize_file(scan, 10);
+  ASSERT_EQ(run(map + path("out")).exit_code, 2);
+  std::filesystem::rename(folder_ / "scan", scan);
+  const ProcessResult resumed = run(map + path("out") + " --resume");
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  const nlohmann::json report = nlohmann::json::parse(resumed.out);
+  EXPECT_EQ(report.at("resumed_at_scan"), 30);
+  EXPECT_FALSE(report.at("health").contains("lost")) << report.at("health");
+  const double ate_m = report.at("accuracy").at("ate_rmse_m");
+  EXPECT_LT(ate_m,
+            nlohmann::json::parse(whole.out).at("accuracy").at("ate_rmse_m").get<double>() + 0.02);
+}
+
+}  // namespace
+}  // namespace stillmap::test
