@@ -14,6 +14,7 @@
 #include "config/loaders/model_file.hpp"
 #include "config/loaders/openmp_waits.hpp"
 #include "core/map/storage/map_file.hpp"
+#include "core/process/standard_streams.hpp"
 #include "core/process/stop_signals.hpp"
 #include "core/segmentation/model_error.hpp"
 #include "idl/dds/dds_error.hpp"
@@ -106,6 +107,7 @@ int serve_in_file(const stillmap::ServerConfig& config) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  stillmap::open_missing_standard_streams();
   stillmap::shorten_openmp_waits(argv);
   stillmap::server::start_log(stillmap::LogLevel::info);
   stillmap::dds::log_dds_to_stderr();

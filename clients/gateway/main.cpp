@@ -12,6 +12,7 @@
 #include "clients/terminal/stop_signal.hpp"
 #include "config/loaders/listening_address.hpp"
 #include "config/loaders/topic_name.hpp"
+#include "core/process/standard_streams.hpp"
 #include "idl/dds/dds_log.hpp"
 
 namespace {
@@ -177,6 +178,7 @@ void add_options(stillmap::cli::CommandHandle command, Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  stillmap::open_missing_standard_streams();
   stillmap::dds::log_dds_to_stderr();
   Arguments arguments;
   stillmap::cli::CommandLine command_line(

@@ -286,6 +286,13 @@ TEST_F(OperationTest, NamesTheOptionThatWasMeant) {
                                     HasSubstr("Did you mean '--delivery'?")));
 }
 
+TEST_F(OperationTest, WithoutStandardErrorTheLogGoesIntoNoFileOfTheMap) {
+  BackgroundProcess server("sh -c 'exec " + server_command() + " 2>&-'", folder_ / "server.log");
+  ASSERT_TRUE(answers());
+  EXPECT_THAT(content("server.stillmap.lock"), testing::Not(HasSubstr("info")));
+  EXPECT_EQ(server.stop(), 0);
+}
+
 TEST_F(OperationTest, LogsByLevelAndForTheJournalWithoutASecondClock) {
   const auto log_of = [&](const std::string& environment, const std::string& options) {
     write("server.log", "");
