@@ -41,6 +41,12 @@ std::string fault_of_unsigned(const std::string& word) {
   return "'" + word + "' is negative; it must be a whole number of 0 or more";
 }
 
+constexpr const char* not_empty = "not empty";
+
+std::string fault_of_text(const std::string& word) {
+  return word.empty() ? "is empty; name something, or leave it out" : "";
+}
+
 /// CLI11 takes what begins with '-' and no digit for an option, numbers such as -inf and -.5, too.
 /// After a blank they are values, and the same numbers.
 std::string marked_number(const std::string& word) {
@@ -190,6 +196,11 @@ OptionHandle OptionHandle::one_of(const std::vector<std::string>& values) {
   return *this;
 }
 
+OptionHandle OptionHandle::or_empty() {
+  option_->get_validator(not_empty)->active(false);
+  return *this;
+}
+
 OptionHandle OptionHandle::ends_in(const std::string& ending) {
   option_->check([ending](const std::string& word) {
     return word.ends_with(ending) ? std::string() : "'" + word + "' must end in " + ending;
@@ -264,7 +275,7 @@ OptionHandle OptionHandle::needs(const OptionHandle& other) {
 
 OptionHandle CommandHandle::option(const std::string& names, std::string& value,
                                    const std::string& help) {
-  return OptionHandle(*app_->add_option(names, value, help));
+  return OptionHandle(*app_->add_option(names, value, help)->check(fault_of_text, "", not_empty));
 }
 
 OptionHandle CommandHandle::option(const std::string& names, double& value,
@@ -293,7 +304,7 @@ OptionHandle CommandHandle::option(const std::string& names, std::optional<std::
 
 OptionHandle CommandHandle::option(const std::string& names, std::vector<std::string>& values,
                                    const std::string& help) {
-  return OptionHandle(*app_->add_option(names, values, help));
+  return OptionHandle(*app_->add_option(names, values, help)->check(fault_of_text, "", not_empty));
 }
 
 OptionHandle CommandHandle::option(const std::string& names, std::vector<double>& values,

@@ -28,6 +28,9 @@ class OptionHandle {
   /// empty.
   OptionHandle corrected(const std::function<std::string(std::string&)>& correct);
   OptionHandle one_of(const std::vector<std::string>& values);
+  /// A text may be empty, which says something here. Elsewhere nobody means that: it is what an
+  /// unset variable of a script leaves.
+  OptionHandle or_empty();
   /// The name of a file with this ending, as ".png".
   OptionHandle ends_in(const std::string& ending);
   OptionHandle above_zero();

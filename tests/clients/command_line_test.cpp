@@ -53,6 +53,30 @@ TEST(CommandLine, OtherWordsWithAMinusStayOptions) {
   }
 }
 
+// "$MAP" of a script that never set it: the server's map was taken instead.
+TEST(CommandLine, RefusesEmptyTexts) {
+  for (const std::vector<std::string>& words : {std::vector<std::string>{""},
+                                                {"a", "--map", ""},
+                                                {"a", "--map="},
+                                                {"a", "--topics", "b", ""},
+                                                {"a", "--none", "", "--map", ""}}) {
+    CommandLine line("program", "1", "help");
+    std::string place, map, none = "imu";
+    std::vector<std::string> topics;
+    line.root().option("PLACE", place, "");
+    line.root().option("--map", map, "");
+    line.root().option("--topics", topics, "");
+    line.root().option("--none", none, "").or_empty();
+    EXPECT_EQ(parse(line, words), CommandLine::Parsed::wrong_usage)
+        << testing::PrintToString(words);
+  }
+  CommandLine line("program", "1", "help");
+  std::string none = "imu";
+  line.root().option("--none", none, "").or_empty();
+  EXPECT_EQ(parse(line, {"--none", ""}), CommandLine::Parsed::command);
+  EXPECT_EQ(none, "");
+}
+
 TEST(CommandLine, AListOfNumbersEndsBeforeALastWordThatIsNone) {
   const std::vector<std::vector<std::string>> spellings{
       {"ask", "city.map", "--path", "0", "0", "-3", "4.5"},

@@ -194,6 +194,16 @@ TEST_F(HelpTest, TopicNamesGoWithoutTheirFirstSlashAndTheRestIsRefused) {
   EXPECT_EQ(names.at("namespace"), "bot");
 }
 
+TEST_F(HelpTest, EmptyNamesAreRefusedWhereTheyWouldMeanSomethingElse) {
+  for (const char* command :
+       {"loops ''", "plan --map '' --from 0,0,0 --to 1,1", "octomap --map x --output ''",
+        "simulate ''", "map city --onto ''", "query --around-robot 5 --out ''"}) {
+    const ProcessResult result = run(command);
+    EXPECT_EQ(result.exit_code, 2) << command;
+    EXPECT_THAT(result.err, HasSubstr("is empty")) << command;
+  }
+}
+
 TEST_F(HelpTest, SecurityTakesTheTopicsOfSeveralLidars) {
   const std::string init = "security init " + path("keys");
   for (const auto& [points, refused] :

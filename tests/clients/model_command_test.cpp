@@ -154,11 +154,19 @@ TEST_F(ModelCommandTest, ANetworkOfOneSizeTakesNoOtherWidth) {
   EXPECT_EQ(other.exit_code, 2);
   EXPECT_THAT(other.err, AllOf(HasSubstr("with 128 image columns"), HasSubstr("model.onnx")));
   EXPECT_EQ(run(map + "64").exit_code, 0);
+  const std::string speed = "speed " + path("model") + " --skip-opencv --threads 1 --columns ";
+  const ProcessResult nothing = model(speed + "128");
+  EXPECT_EQ(nothing.exit_code, 2) << "nothing was measured";
+  EXPECT_THAT(nothing.err, HasSubstr("skipped"));
+  EXPECT_EQ(model(speed + "128,64").exit_code, 0);
 }
 
 TEST_F(ModelCommandTest, BadModelsAreBadInput) {
   EXPECT_EQ(model("info " + path("nothing")).exit_code, 2);
   EXPECT_EQ(model("speed " + path("model") + " --columns wide").exit_code, 2);
+  const ProcessResult late = model("speed " + path("model") + " --columns 64,wide --skip-opencv");
+  EXPECT_EQ(late.exit_code, 2);
+  EXPECT_THAT(late.err, testing::Not(HasSubstr("timing"))) << "before minutes of measuring";
   write("model/model.onnx", "no network");
   const ProcessResult result = model("info " + path("model"));
   EXPECT_EQ(result.exit_code, 2);

@@ -281,7 +281,10 @@ ExitCode run(const EvaluateDrivesArguments& arguments) {
     if (stop.requested()) break;
   }
   std::cout << (arguments.json ? rows.dump(2) + "\n" : table.text());
-  return stop.requested() ? ExitCode::failed : ExitCode::ok;
+  if (!stop.requested()) return ExitCode::ok;
+  std::cerr << "stillmap: stopped early, as asked: the last drive is of its first scans alone, and "
+               "drives after it are missing\n";
+  return ExitCode::failed;
 }
 
 }  // namespace

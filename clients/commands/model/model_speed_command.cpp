@@ -257,19 +257,23 @@ ExitCode run(const ModelSpeedArguments& arguments) {
   if (!arguments.beside.empty()) return run_beside_load(arguments, scan);
   Table table({"network", "image", "engine", "project ms", "network ms", "votes ms", "total ms",
                "Gop/s", "peak", "%", "MB"});
+  std::vector<std::uint32_t> widths;
+  for (const std::string& columns : arguments.columns)
+    widths.push_back(whole_number("--columns", columns, max_image_columns));
+  bool is_any_timed = false;
   for (const std::string& model_path : arguments.models) {
-    for (const std::string& columns : arguments.columns) {
+    for (const std::uint32_t columns : widths) {
       const ModelDescription model =
-          load_model({.model = model_path,
-                      .rows = 0,
-                      .columns = whole_number("--columns", columns, max_image_columns)});
+          load_model({.model = model_path, .rows = 0, .columns = columns});
       try {
         time_model(model, scan, arguments, table);
+        is_any_timed = true;
       } catch (const ModelError& error) {
         std::cerr << "stillmap: skipped: " << error.what() << "\n";
       }
     }
   }
+  if (!is_any_timed) return ExitCode::bad_input;
   std::cout << table.text() << "Medians for a scan of " << scan.size()
             << " points. peak: a matrix product of oneDNN just before, in the same numbers.\n"
             << "MB: growth of the process by the network.\n";

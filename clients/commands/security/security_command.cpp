@@ -240,17 +240,21 @@ void add_security_init_command(CommandHandle security, Action& action) {
       .option("--odometry-prior", arguments->names.odometry_prior,
               "Topic of the odometry prior; empty: none")
       .corrected(to_topic_name_or_empty)
+      .or_empty()
       .with_default();
   command.option("--imu", arguments->names.imu, "Topic of the IMU; empty: none")
       .corrected(to_topic_name_or_empty)
+      .or_empty()
       .with_default();
   command.option("--gnss", arguments->names.gnss, "Topic of a GNSS receiver; empty: none")
       .corrected(to_topic_name_or_empty)
+      .or_empty()
       .with_default();
   command
       .option("--initial-pose", arguments->names.initial_pose,
               "Topic on which operators say where the robot is; empty: none")
       .corrected(to_topic_name_or_empty)
+      .or_empty()
       .with_default();
   command.option("--server", arguments->names.name_space, "First part of the server's topic names")
       .corrected(to_topic_name)
