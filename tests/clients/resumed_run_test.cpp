@@ -32,5 +32,22 @@ TEST_F(ResumedRunTest, GoesOnWhereAFastLidarWasInItsTurn) {
             nlohmann::json::parse(whole.out).at("accuracy").at("ate_rmse_m").get<double>() + 0.02);
 }
 
+// A map of a street, and poses that stay where it ended, would look like a result.
+TEST_F(ResumedRunTest, FailsWhereNothingMoreFitsWhatItHadMapped) {
+  simulate("drive", 24);
+  const ProcessResult elsewhere =
+      run("simulate " + path("elsewhere") + " --preset quiet --seed 9 --scans 24 --sensor vlp_16");
+  ASSERT_EQ(elsewhere.exit_code, 0) << elsewhere.err;
+  const std::string map = "map " + path("drive") + " --labels none --strict --out " + path("out");
+  std::filesystem::resize_file(folder_ / "drive/velodyne/000012.bin", 10);
+  ASSERT_EQ(run(map + " --save-period 0.0001").exit_code, 2);
+  std::filesystem::remove_all(folder_ / "drive");
+  std::filesystem::rename(folder_ / "elsewhere", folder_ / "drive");
+  const ProcessResult resumed = run(map + " --resume");
+  EXPECT_EQ(resumed.exit_code, 1);
+  EXPECT_THAT(resumed.err, AllOf(HasSubstr("none of the 12 scans"), HasSubstr("--force")));
+  EXPECT_FALSE(exists("out/map.stillmap"));
+}
+
 }  // namespace
 }  // namespace stillmap::test

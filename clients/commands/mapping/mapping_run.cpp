@@ -107,7 +107,9 @@ class MappingRun {
       result_.moving += evaluation::moving_score(mapped->labelled.motion, true_ids);
   }
 
+  /// Throws std::runtime_error where nothing of a resumed run was found in what it had mapped.
   MappingResult finish(bool stopped) {
+    if (!stopped) check_found_again();
     result_.trajectory = result_.odometry = path();
     // Submaps hold dropped poses, too: loops stay open then.
     const bool has_all_scans = loops_ && loops_->scan_count() == result_.trajectory.size();
@@ -137,6 +139,17 @@ class MappingRun {
   }
 
  private:
+  void check_found_again() const {
+    // Some scans may be lost in any run.
+    constexpr std::size_t min_scans = 10;
+    const std::size_t scans = mapper_.trajectory().size();
+    if (earlier_.empty() || is_registered_ || scans < min_scans) return;
+    throw std::runtime_error(
+        "none of the " + std::to_string(scans) +
+        " scans since the run was resumed could be registered to what it had mapped before: the "
+        "lidar is not where its path leads. Begin anew with --force");
+  }
+
   [[nodiscard]] StampedPose lidar_pose(const StampedPose& body) const {
     return {body.stamp_ns, body.T_map_lidar * T_body_lidar_};
   }
