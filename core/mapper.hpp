@@ -220,8 +220,11 @@ class Mapper {
   /// After that, where the next scan follows soon on those that the map was made of: the lidar
   /// moved so between their last two poses, and goes on as it did. Without this the first scan of a
   /// lidar that turns while it moves is taken for one that stood, and a fast one is not found.
-  void go_on_from(const StampedPose& before_last, const StampedPose& last) {
-    odometry_.go_on_from(before_last, last);
+  /// Poses are those of its body. A velocity that is known stays.
+  void go_on_from(const StampedPose& before_last, const StampedPose& last,
+                  const Eigen::Isometry3d& T_body_lidar = Eigen::Isometry3d::Identity()) {
+    odometry_.go_on_from({before_last.stamp_ns, before_last.T_map_lidar * T_body_lidar},
+                         {last.stamp_ns, last.T_map_lidar * T_body_lidar});
   }
   /// The same with a static map that resumed a stored one already, elsewhere: cannot fail, and
   /// takes as long for a large map as for a small one. Returns the map until now, for another

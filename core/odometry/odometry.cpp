@@ -159,6 +159,7 @@ void Odometry::begin_map(const std::optional<double>& reach_m) {
 void Odometry::go_on_from(const StampedPose& before_last, const StampedPose& last) {
   State& state = *state_;
   assert(!state.started);
+  if (state.last.interval_s > 0.0) return;
   const double interval_s = 1e-9 * static_cast<double>(last.stamp_ns - before_last.stamp_ns);
   if (interval_s <= 0.0 || interval_s > max_prediction_s) return;
   const RegisteredScan from{.features = {}, .T_map_lidar = before_last.T_map_lidar};

@@ -84,8 +84,8 @@ class Odometry {
   /// is given, instead of OdometryConfig::first_reach_m.
   void begin_map(const std::optional<double>& reach_m = std::nullopt);
   /// Before the first scan of a map: the lidar moved from one of these poses, of two scans at their
-  /// stamps, to the other, and goes on as it did. Nothing is taken from what no lidar does, or from
-  /// poses that are too long apart to tell a velocity.
+  /// stamps, to the other, and goes on as it did. A velocity that is known stays. Nothing is taken
+  /// from what no lidar does, or from poses that are too long apart to tell a velocity.
   void go_on_from(const StampedPose& before_last, const StampedPose& last);
   /// Where the first scan of a map comes, in the middle of a sweep that is so long after its stamp:
   /// forgets a velocity of too long ago, or of another clock.

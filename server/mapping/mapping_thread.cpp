@@ -232,10 +232,6 @@ void MappingThread::follow(const MapCorrector::Result& result) {
   outputs_.loops->report(result.correction, *result.corrected, result.ms);
 }
 
-void MappingThread::publish_now() {
-  requests_.run([this] { publish_snapshot(); });
-}
-
 void MappingThread::stop() {
   if (!worker_) return;
   worker_.reset();
@@ -447,8 +443,11 @@ std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns)
     }
   }
   if (mapper_.trajectory().empty()) {
+    const Eigen::Isometry3d& T_base_lidar = frames_.T_base_lidar();
+    if (const auto way = latest_map_.way_in_loaded_path(stamp_ns); way.size() == 2)
+      mapper_.go_on_from(way[0], way[1], T_base_lidar);
     const auto T_map_base_stored = latest_map_.pose_in_loaded_path(stamp_ns);
-    if (T_map_base_stored) return *T_map_base_stored * frames_.T_base_lidar();
+    if (T_map_base_stored) return *T_map_base_stored * T_base_lidar;
   }
   // It begins where the robot stands, whichever way its lidar looks.
   if (frames_.has_base() && mapper_.begins_map()) return std::nullopt;

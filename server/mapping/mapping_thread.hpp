@@ -90,7 +90,9 @@ class MappingThread : public CheckpointSource {
   [[nodiscard]] std::function<void()> prepare(const SavedMap& stored,
                                               const std::shared_ptr<TileStore>& tile_store);
   /// Publishes what was mapped so far, the scan in work included.
-  void publish_now();
+  void publish_now() {
+    requests_.run([this] { publish_snapshot(); });
+  }
 
   /// It is also published as the latest map.
   [[nodiscard]] RunCheckpoint checkpoint(CheckpointScope scope) override;

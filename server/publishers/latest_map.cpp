@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <utility>
 
 namespace stillmap::server {
@@ -137,6 +138,14 @@ std::optional<Eigen::Isometry3d> LatestMap::pose_in_loaded_path(std::int64_t sta
   if (path.empty()) return std::nullopt;
   const auto then = std::ranges::find(path, stamp_ns, &StampedPose::stamp_ns);
   return then == path.end() ? path.back().T_map_lidar : then->T_map_lidar;
+}
+
+Trajectory LatestMap::way_in_loaded_path(std::int64_t stamp_ns) const {
+  const SharedTrajectory path = trajectory();
+  const auto then = std::ranges::find(path, stamp_ns, &StampedPose::stamp_ns);
+  const auto before = static_cast<std::size_t>(std::distance(path.begin(), then));
+  if (before < 2) return {};
+  return {path[before - 2], path[before - 1]};
 }
 
 std::size_t LatestMap::poses_stored() const {

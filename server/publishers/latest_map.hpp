@@ -68,6 +68,9 @@ class LatestMap {
   /// that merely lies within the stored path's times may be that of a clock not set yet. Nothing
   /// without a stored path.
   [[nodiscard]] std::optional<Eigen::Isometry3d> pose_in_loaded_path(std::int64_t stamp_ns) const;
+  /// The two stored poses before that scan's, or the path's last two; nothing where there are
+  /// fewer.
+  [[nodiscard]] Trajectory way_in_loaded_path(std::int64_t stamp_ns) const;
   /// Poses of the path.
   [[nodiscard]] std::size_t poses_stored() const;
   /// Poses added so far, over all maps: changes with every scan.

@@ -162,6 +162,16 @@ TEST_F(OdometrySequence, GoesOnAsItIsToldThatItMoved) {
   expect_near(motion_after(800'000'000, motion, 100'000'000), nothing, 1e-9, 1e-9);
 }
 
+TEST_F(OdometrySequence, KnowsItsOwnVelocityBetter) {
+  Odometry odometry(OdometryConfig{}, test::test_lidar());
+  static_cast<void>(results(quiet(), odometry, true));
+  const Eigen::Isometry3d motion = odometry.motion_during(0.1);
+  odometry.begin_map();
+  odometry.go_on_from({0, level_pose(0.0, 0.0, 0.0)}, {100'000'000, level_pose(2.0, 0.0, 0.1)});
+  odometry.expect_first_scan(quiet().scans.back().scan.stamp_ns + 100'000'000);
+  expect_near(odometry.motion_during(0.1), motion, 1e-12, 1e-7);
+}
+
 TEST_F(OdometrySequence, PredictsConstantVelocityUpToASecond) {
   Odometry odometry(OdometryConfig{}, test::test_lidar());
   EXPECT_TRUE(odometry.motion_during(0.1).isApprox(Eigen::Isometry3d::Identity()));

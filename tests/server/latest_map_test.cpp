@@ -38,6 +38,24 @@ TEST(LatestMap, KeepsThePathOfEarlierRunsWhateverTheClockSays) {
   EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{10, 20, 30, 2, 4}));
 }
 
+TEST(LatestMap, TellsHowItCameToAScanOfTheLoadedPathOrToItsEnd) {
+  const auto way = [](const SharedTrajectory& path, std::int64_t stamp_ns) {
+    LatestMap latest_map;
+    latest_map.begin(std::make_shared<const MapSnapshot>(), path);
+    std::vector<std::int64_t> out;
+    for (const StampedPose& pose : latest_map.way_in_loaded_path(stamp_ns))
+      out.push_back(pose.stamp_ns);
+    return out;
+  };
+  const SharedTrajectory path{{.stamp_ns = 10}, {.stamp_ns = 20}, {.stamp_ns = 30}};
+  using Stamps = std::vector<std::int64_t>;
+  EXPECT_EQ(way(path, 40), (Stamps{20, 30}));
+  EXPECT_EQ(way(path, 30), (Stamps{10, 20}));
+  EXPECT_EQ(way(path, 20), Stamps{}) << "one pose tells no motion";
+  EXPECT_EQ(way({{.stamp_ns = 10}}, 40), Stamps{});
+  EXPECT_EQ(way({}, 40), Stamps{});
+}
+
 TEST(LatestMap, KeepsThePathUntilTheClockWasSetBack) {
   LatestMap latest_map;
   latest_map.begin(std::make_shared<const MapSnapshot>(), {{.stamp_ns = 10}});

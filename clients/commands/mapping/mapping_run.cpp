@@ -51,7 +51,7 @@ class MappingRun {
     mapper_.resume(earlier.map.view, earlier.map.tile_evidence);
     earlier_ = earlier.map.trajectory.to_vector();
     if (earlier_.size() > 1)
-      mapper_.go_on_from(lidar_pose(earlier_[earlier_.size() - 2]), lidar_pose(earlier_.back()));
+      mapper_.go_on_from(earlier_[earlier_.size() - 2], earlier_.back(), T_body_lidar_);
     if (loops_) loops_->resume(earlier.next_scan, earlier.scan_of_pose.size());
     result_.scan_of_pose = std::move(earlier.scan_of_pose);
     result_.resumed_at_scan = earlier.next_scan;
