@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -18,51 +19,35 @@ namespace {
 constexpr int max_columns = 1024;
 
 /// So many points are projected at once, in vector registers.
-constexpr Eigen::Index batch_size = 256;
-using Batch = Eigen::Array<float, batch_size, 1>;
-using WholeBatch = Eigen::Array<int, batch_size, 1>;
+constexpr std::size_t batch_size = 256;
 
 constexpr float pi = std::numbers::pi_v<float>;
 
 /// Arc tangent of `t`, |t| <= 1, to 1e-5 rad: a five hundredth of a pixel.
-template <class T>
-T small_arc_tangent(const T& t) {
-  const T s = t * t;
+inline float small_arc_tangent(float t) {
+  const float s = t * t;
   return t * (0.99997726F +
               s * (-0.33262347F +
                    s * (0.19354346F + s * (-0.11643287F + s * (0.05265332F + s * -0.01172120F)))));
 }
 
-float fast_atan2(float y, float x) {
-  // Without branches: the octant of the next point is anybody's guess.
+/// Without branches: the octant of the next point is anybody's guess, and of many points the
+/// compiler makes vectors.
+inline float fast_atan2(float y, float x) {
   const float width = std::abs(x);
   const float height = std::abs(y);
   const float larger = std::max(width, height);
-  const float within_octant =
-      small_arc_tangent(std::min(width, height) / (larger > 0.0F ? larger : 1.0F));
+  // Right above or below the lidar both are 0.
+  const float within_octant = small_arc_tangent(
+      std::min(width, height) / std::max(larger, std::numeric_limits<float>::min()));
   const float within_quadrant = height > width ? 0.5F * pi - within_octant : within_octant;
   return std::copysign(x < 0.0F ? pi - within_quadrant : within_quadrant, y);
 }
 
-/// The same for many.
-Batch fast_atan2(const Batch& y, const Batch& x) {
-  // Right above or below the lidar both are 0.
-  const Batch larger = x.abs().max(y.abs()).max(std::numeric_limits<float>::min());
-  const Batch smaller = x.abs().min(y.abs());
-  Batch angle = small_arc_tangent<Batch>(smaller / larger);
-  angle = (y.abs() > x.abs()).select(0.5F * pi - angle, angle);
-  angle = (x < 0.0F).select(pi - angle, angle);
-  return (y < 0.0F).select(-angle, angle);
-}
-
 /// From 0 to `last`; 0 where NaN, which no whole number is.
-WholeBatch whole(const Batch& share, float last) {
-  WholeBatch result;
-  for (Eigen::Index k = 0; k < batch_size; ++k) {
-    const float at_least_0 = share[k] > 0.0F ? share[k] : 0.0F;
-    result[k] = static_cast<int>(at_least_0 < last ? at_least_0 : last);
-  }
-  return result;
+inline int whole(float share, float last) {
+  const float at_least_0 = share > 0.0F ? share : 0.0F;
+  return static_cast<int>(at_least_0 < last ? at_least_0 : last);
 }
 
 /// Between sparse beams as much is not seen to the sides as above and below.
@@ -94,10 +79,13 @@ constexpr int min_columns = 32;
 /// between two beams: 76 degrees from facing the lidar.
 constexpr float max_slope = 4.0F;
 
-/// How far from the first edge of its row or column, in 256ths of it. The outermost beams may lie
-/// beyond.
-std::uint8_t share_of_pixel(float at, float edge) {
-  return static_cast<std::uint8_t>(std::clamp(256.0F * (at - edge), 0.0F, 255.0F));
+/// A whole number that sorts as the float does, and the float of one.
+inline std::int32_t ordered(float value) {
+  const auto bits = std::bit_cast<std::int32_t>(value);
+  return bits ^ ((bits >> 31) & std::numeric_limits<std::int32_t>::max());
+}
+inline float from_ordered(std::int32_t word) {
+  return std::bit_cast<float>(word ^ ((word >> 31) & std::numeric_limits<std::int32_t>::max()));
 }
 
 }  // namespace
@@ -114,7 +102,7 @@ RangeImageView::RangeImageView(const Scan& scan, std::span<const SemanticClass> 
       below_row_top_(pixels_.size()),
       in_column_(pixels_.size()) {
   move_to(T_map_lidar);
-  std::vector<Return> returns(scan.size());
+  Returns returns(scan.size());
   measure(scan, labels, returns);
   // A lidar that fires less often than it has columns leaves pixels empty between its shots.
   if (const float between = columns_a_shot(); between > max_columns_a_shot) {
@@ -123,9 +111,10 @@ RangeImageView::RangeImageView(const Scan& scan, std::span<const SemanticClass> 
         min_columns, static_cast<int>(static_cast<float>(columns_) / (between * shots_a_column)));
     // A shot may be anywhere in its column: one more is asked to either side.
     columns_beside_ = columns_for_half_a_row(rows_per_rad_, columns_) + 1;
-    pixels_.assign(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(columns_), 0.0F);
-    below_row_top_.assign(pixels_.size(), 0);
-    in_column_.assign(pixels_.size(), 0);
+    const std::size_t count = static_cast<std::size_t>(rows_) * static_cast<std::size_t>(columns_);
+    pixels_.resize(count);
+    below_row_top_.resize(count);
+    in_column_.resize(count);
     full_column_ = std::min(256, 256 * columns_ / full_columns);
     measure(scan, labels, returns);
   }
@@ -133,20 +122,19 @@ RangeImageView::RangeImageView(const Scan& scan, std::span<const SemanticClass> 
 }
 
 void RangeImageView::measure(const Scan& scan, std::span<const SemanticClass> labels,
-                             std::vector<Return>& returns) {
+                             Returns& returns) {
   const auto wider = [](const RowRange& a, const RowRange& b) {
     return RowRange{std::min(a.first, b.first), std::max(a.last, b.last)};
   };
   seen_rows_ = tbb::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, scan.size(), 4096), RowRange{},
-      [&](const auto& block, RowRange rows) {
-        constexpr auto step = static_cast<std::size_t>(batch_size);
-        for (std::size_t i = block.begin(); i < block.end(); i += step) {
-          const std::size_t count = std::min(step, block.end() - i);
-          rows = wider(rows, project(std::span(scan.points_lidar).subspan(i, count),
-                                     std::span(returns).subspan(i, count)));
+      [&](const auto& block, const RowRange& rows) {
+        RowRange all = rows;
+        for (std::size_t i = block.begin(); i < block.end(); i += batch_size) {
+          const std::size_t count = std::min(batch_size, block.end() - i);
+          all = wider(all, project(std::span(scan.points_lidar).subspan(i, count), i, returns));
         }
-        return rows;
+        return all;
       },
       wider);
   fill(returns, labels);
@@ -177,26 +165,36 @@ float RangeImageView::columns_a_shot() const {
   return count < min_gaps ? 1.0F : static_cast<float>(sum) / static_cast<float>(count);
 }
 
-void RangeImageView::fill(std::span<const Return> returns, std::span<const SemanticClass> labels) {
+void RangeImageView::fill(const Returns& returns, std::span<const SemanticClass> labels) {
+  // Range, whether it may move, and where in the pixel in one word each: one of two returns is
+  // chosen without branches, since which comes first is anybody's guess.
+  constexpr std::uint64_t empty = ~std::uint64_t{0};
+  constexpr std::uint64_t may_move = 1U << 16U;
+  // And one for returns that are in no pixel.
+  std::vector<std::uint64_t> words(pixels_.size() + 1, empty);
+  for (std::size_t i = 0; i < returns.pixels.size(); ++i) {
+    std::uint64_t& word = words[returns.pixels[i]];
+    const bool is_movable_one = !labels.empty() && is_movable(labels[i]);
+    const std::uint64_t found = std::uint64_t{std::bit_cast<std::uint32_t>(returns.ranges_m[i])}
+                                    << 32U |
+                                (is_movable_one ? may_move : 0U) | returns.places[i];
+    word = found >> 32U < word >> 32U ? found : word;
+  }
   float* const pixels = pixels_.data();
   std::uint8_t* const below_row_top = below_row_top_.data();
   std::uint8_t* const in_column = in_column_.data();
-  for (std::size_t i = 0; i < returns.size(); ++i) {
-    const Return& found = returns[i];
-    if (found.pixel == none) continue;
-    // Without branches: which of two returns comes first is anybody's guess.
-    const float old = pixels[found.pixel];
-    const std::uint8_t old_below = below_row_top[found.pixel];
-    const bool is_nearer = (old == 0.0F) | (found.range_m < std::abs(old));
-    const bool may_move = !labels.empty() && is_movable(labels[i]);
-    const float signed_range = may_move ? found.range_m : -found.range_m;
-    pixels[found.pixel] = is_nearer ? signed_range : old;
-    below_row_top[found.pixel] = is_nearer ? found.below_row_top : old_below;
-    in_column[found.pixel] = is_nearer ? found.in_column : in_column[found.pixel];
+  for (std::size_t k = 0; k < pixels_.size(); ++k) {
+    const std::uint64_t word = words[k];
+    const bool is_empty = word == empty;
+    const auto range_m = std::bit_cast<float>(static_cast<std::uint32_t>(word >> 32U));
+    const float signed_range_m = (word & may_move) != 0 ? range_m : -range_m;
+    pixels[k] = is_empty ? 0.0F : signed_range_m;
+    below_row_top[k] = is_empty ? 0 : static_cast<std::uint8_t>(word >> 8U);
+    in_column[k] = is_empty ? 0 : static_cast<std::uint8_t>(word);
   }
 }
 
-std::vector<std::uint8_t> RangeImageView::thin_ones(std::span<const Return> returns) const {
+std::vector<std::uint8_t> RangeImageView::thin_ones(const Returns& returns) const {
   std::vector<std::uint8_t> is_thin_at(pixels_.size());
   std::vector<std::uint8_t> may_be_thin(static_cast<std::size_t>(columns_));
   // Of the outermost beams nothing is known above or below.
@@ -206,11 +204,12 @@ std::vector<std::uint8_t> RangeImageView::thin_ones(std::span<const Return> retu
       if (may_be_thin[static_cast<std::size_t>(column)] != 0)
         is_thin_at[index(row, column)] = is_thin(row, column) ? 1 : 0;
   }
-  std::vector<std::uint8_t> thin(returns.size());
-  std::ranges::transform(returns, thin.begin(), [&](const Return& point) -> std::uint8_t {
-    if (point.pixel == none || is_thin_at[point.pixel] == 0) return 0;
-    return point.range_m <= std::abs(pixels_[point.pixel]) + max_depth_m ? 1 : 0;
-  });
+  std::vector<std::uint8_t> thin(returns.pixels.size());
+  for (std::size_t i = 0; i < thin.size(); ++i) {
+    const std::uint32_t pixel = returns.pixels[i];
+    if (pixel == pixels_.size() || is_thin_at[pixel] == 0) continue;
+    thin[i] = returns.ranges_m[i] <= std::abs(pixels_[pixel]) + max_depth_m ? 1 : 0;
+  }
   return thin;
 }
 
@@ -235,53 +234,85 @@ void RangeImageView::move_to(const Eigen::Isometry3d& T_map_lidar) {
   origin_map_ = T_map_lidar.translation().cast<float>();
 }
 
-RangeImageView::RowRange RangeImageView::project(std::span<const Eigen::Vector3f> points_lidar,
-                                                 std::span<Return> returns) const {
-  Batch x = Batch::Ones(), y = Batch::Ones(), z = Batch::Ones();
-  for (std::size_t i = 0; i < points_lidar.size(); ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    x[k] = points_lidar[i].x();
-    y[k] = points_lidar[i].y();
-    z[k] = points_lidar[i].z();
+/// Where points are in an image, in fractions of rows and columns; whatever their coordinates are.
+class RangeImageView::Places {
+ public:
+  explicit Places(const RangeImageView& view)
+      : rows_per_rad_(view.rows_per_rad_),
+        fov_up_(view.fov_up_),
+        half_columns_(0.5F * static_cast<float>(view.columns_)),
+        last_row_(static_cast<float>(view.rows_ - 1)),
+        last_column_(static_cast<float>(view.columns_ - 1)),
+        columns_(view.columns_) {}
+
+  struct Place {
+    float range_m, row, column;
+    int whole_row, whole_column;
+    /// In 256ths of the row and the column. The outermost beams may lie beyond.
+    int below_row_top, in_column;
+  };
+  [[nodiscard]] Place of(float x, float y, float z) const {
+    const float squared_across = x * x + y * y;
+    const float across = std::sqrt(squared_across);
+    Place place{};
+    place.range_m = std::sqrt(squared_across + z * z);
+    place.row = (fov_up_ - fast_atan2(z, across)) * rows_per_rad_;
+    place.column = (1.0F - fast_atan2(y, x) / pi) * half_columns_;
+    place.whole_row = whole(place.row, last_row_);
+    place.whole_column = whole(place.column, last_column_);
+    place.below_row_top = whole(256.0F * (place.row - static_cast<float>(place.whole_row)), 255.0F);
+    place.in_column =
+        whole(256.0F * (place.column - static_cast<float>(place.whole_column)), 255.0F);
+    return place;
   }
-  const Batch across = (x.square() + y.square()).sqrt();
-  const Batch range_m = (across.square() + z.square()).sqrt();
-  const Batch row = (fov_up_ - fast_atan2(z, across)) * rows_per_rad_;
-  const Batch column = 0.5F * (1.0F - fast_atan2(y, x) / pi) * static_cast<float>(columns_);
-  const WholeBatch r = whole(row, static_cast<float>(rows_ - 1));
-  const WholeBatch c = whole(column, static_cast<float>(columns_ - 1));
-  const WholeBatch pixel = r * columns_ + c;
-  const WholeBatch in_column = whole(256.0F * (column - c.cast<float>()), 255.0F);
-  const WholeBatch below_row_top = whole(256.0F * (row - r.cast<float>()), 255.0F);
+  [[nodiscard]] std::uint32_t pixel(const Place& place) const {
+    return static_cast<std::uint32_t>(place.whole_row * columns_ + place.whole_column);
+  }
+
+ private:
+  float rows_per_rad_, fov_up_, half_columns_, last_row_, last_column_;
+  int columns_;
+};
+
+RangeImageView::RowRange RangeImageView::project(std::span<const Eigen::Vector3f> points_lidar,
+                                                 std::size_t first_point, Returns& returns) const {
+  const Places places(*this);
+  const auto no_pixel = static_cast<std::uint32_t>(pixels_.size());
   // Half a row of slack: the outermost beams look along the edge of the field of view.
   const float last_row = static_cast<float>(rows_) + 0.5F;
-  RowRange rows;
+  std::uint32_t* const pixels = &returns.pixels[first_point];
+  float* const ranges_m = &returns.ranges_m[first_point];
+  std::uint16_t* const in_pixels = &returns.places[first_point];
+  // Of floats the compiler does not find the least of many at once.
+  std::array<std::int32_t, batch_size> rows_low, rows_high;
+  const std::int32_t no_low = ordered(RowRange{}.first), no_high = ordered(RowRange{}.last);
   for (std::size_t i = 0; i < points_lidar.size(); ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    const bool is_seen = (range_m[k] > 0.0F) & (row[k] >= -0.5F) & (row[k] < last_row);
-    returns[i] = {is_seen ? static_cast<std::uint32_t>(pixel[k]) : none, range_m[k],
-                  static_cast<std::uint8_t>(below_row_top[k]),
-                  static_cast<std::uint8_t>(in_column[k])};
-    rows.first = is_seen ? std::min(rows.first, row[k]) : rows.first;
-    rows.last = is_seen ? std::max(rows.last, row[k]) : rows.last;
+    const auto place = places.of(points_lidar[i].x(), points_lidar[i].y(), points_lidar[i].z());
+    const bool is_seen = (place.range_m > 0.0F) & (place.row >= -0.5F) & (place.row < last_row);
+    pixels[i] = is_seen ? places.pixel(place) : no_pixel;
+    ranges_m[i] = place.range_m;
+    in_pixels[i] = static_cast<std::uint16_t>(place.below_row_top << 8 | place.in_column);
+    rows_low[i] = is_seen ? ordered(place.row) : no_low;
+    rows_high[i] = is_seen ? ordered(place.row) : no_high;
   }
-  return rows;
+  std::int32_t low = no_low, high = no_high;
+  for (std::size_t i = 0; i < points_lidar.size(); ++i) {
+    low = std::min(low, rows_low[i]);
+    high = std::max(high, rows_high[i]);
+  }
+  return {from_ordered(low), from_ordered(high)};
 }
 
 std::optional<RangeImageView::Direction> RangeImageView::direction_of(
     const Eigen::Vector3f& point_lidar, float range_m) const {
-  const float elevation = fast_atan2(point_lidar.z(), point_lidar.head<2>().norm());
-  const float turn = 0.5F * (1.0F - fast_atan2(point_lidar.y(), point_lidar.x()) / pi);
-  const float row = (fov_up_ - elevation) * rows_per_rad_;
-  const bool is_seen = range_m > 0.0F && row >= seen_rows_.first && row <= seen_rows_.last;
+  const auto place = Places(*this).of(point_lidar.x(), point_lidar.y(), point_lidar.z());
+  const bool is_seen =
+      range_m > 0.0F && place.row >= seen_rows_.first && place.row <= seen_rows_.last;
   if (!is_seen) return std::nullopt;
-  const int r = std::clamp(static_cast<int>(row), 0, rows_ - 1);
-  const float column = turn * static_cast<float>(columns_);
-  const int c = std::clamp(static_cast<int>(column), 0, columns_ - 1);
-  return Direction{.row = r,
-                   .column = c,
-                   .below_row_top = share_of_pixel(row, static_cast<float>(r)),
-                   .in_column = share_of_pixel(column, static_cast<float>(c))};
+  return Direction{.row = place.whole_row,
+                   .column = place.whole_column,
+                   .below_row_top = static_cast<std::uint8_t>(place.below_row_top),
+                   .in_column = static_cast<std::uint8_t>(place.in_column)};
 }
 
 float RangeImageView::next_range_m(int row, int column, int step) const {

@@ -71,13 +71,17 @@ class RangeImageView {
   void move_to(const Eigen::Isometry3d& T_map_lidar);
 
  private:
-  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-  /// Where a point was measured: its pixel, or `none` outside the field of view or without a range.
-  struct Return {
-    std::uint32_t pixel = 0;
-    float range_m = 0.0F;
-    std::uint8_t below_row_top = 0;
-    std::uint8_t in_column = 0;
+  class Places;
+  /// Where the points of a scan were measured.
+  struct Returns {
+    explicit Returns(std::size_t count) : pixels(count), ranges_m(count), places(count) {}
+
+    /// The pixel, or the number of pixels outside the field of view or without a range.
+    std::vector<std::uint32_t> pixels;
+    std::vector<float> ranges_m;
+    /// How far below the top of its row, and right of the left edge of its column, each in 256ths
+    /// in 8 bits.
+    std::vector<std::uint16_t> places;
   };
   /// The nearest return up or down from a pixel.
   struct Beside {
@@ -91,15 +95,15 @@ class RangeImageView {
   RangeImageView(const Scan& scan, std::span<const SemanticClass> labels, const SensorModel& sensor,
                  const Eigen::Isometry3d& T_map_lidar, std::vector<std::uint8_t>* is_thin);
   /// Projects and fills as many columns as there are.
-  void measure(const Scan& scan, std::span<const SemanticClass> labels,
-               std::vector<Return>& returns);
+  void measure(const Scan& scan, std::span<const SemanticClass> labels, Returns& returns);
   /// From one column in which something was measured to the next one of its row, where the lidar
   /// fires once in so many columns, 1 or more: the mean without gaps where rays did not return.
   [[nodiscard]] float columns_a_shot() const;
-  /// Returns the rows between which the points lie.
-  RowRange project(std::span<const Eigen::Vector3f> points_lidar, std::span<Return> returns) const;
+  /// Of some of the points, from this one on. Returns the rows between which they lie.
+  RowRange project(std::span<const Eigen::Vector3f> points_lidar, std::size_t first_point,
+                   Returns& returns) const;
   /// Of each pixel the nearest return.
-  void fill(std::span<const Return> returns, std::span<const SemanticClass> labels);
+  void fill(const Returns& returns, std::span<const SemanticClass> labels);
   [[nodiscard]] std::optional<Direction> direction_of(const Eigen::Vector3f& point_lidar,
                                                       float range_m) const;
   [[nodiscard]] std::size_t index(int row, int column) const {
@@ -111,7 +115,7 @@ class RangeImageView {
   /// Up (-1) or down (1), in a column and those on either side of it.
   [[nodiscard]] Beside nearest_beside(int row, int column, int step) const;
   /// Which of the scan's points one beam alone hit (see the constructor).
-  [[nodiscard]] std::vector<std::uint8_t> thin_ones(std::span<const Return> returns) const;
+  [[nodiscard]] std::vector<std::uint8_t> thin_ones(const Returns& returns) const;
   [[nodiscard]] bool is_thin(int row, int column) const;
   /// Of the pixels of a row between two others: 1 where is_thin() may hold, since no surface goes
   /// on in the rows right above and below, 0 where one does, or where nothing was measured.
