@@ -16,8 +16,8 @@ constexpr std::uint32_t no_tile = std::numeric_limits<std::uint32_t>::max();
 
 /// So many points are placed at once, in vector registers.
 constexpr std::size_t lanes = 32;
-using Lanes = Eigen::Array<double, static_cast<int>(lanes), 1>;
-using WholeLanes = Eigen::Array<int, static_cast<int>(lanes), 1>;
+using Lanes = std::array<double, lanes>;
+using WholeLanes = std::array<std::int32_t, lanes>;
 
 }  // namespace
 
@@ -42,71 +42,72 @@ std::span<const ScanSorter::Batch> ScanSorter::sort(const LabelledScan& scan,
   return batches_;
 }
 
-ScanSorter::PoseInVoxels::PoseInVoxels(const Eigen::Isometry3d& T_map_lidar, double voxel_size_m) {
-  const Eigen::Matrix<double, 3, 4> in_voxels = T_map_lidar.affine() / voxel_size_m;
-  x = in_voxels.col(0);
-  y = in_voxels.col(1);
-  z = in_voxels.col(2);
-  origin = in_voxels.col(3);
-}
+ScanSorter::PoseInVoxels::PoseInVoxels(const Eigen::Isometry3d& T_map_lidar, double voxel_size_m)
+    : in_voxels_(T_map_lidar.affine() / voxel_size_m) {}
 
 /// Where some points lie: the place of their tile in the window, or `no_tile`, their voxel in it,
-/// and how far they are from its lowest corner, in parts of it. Without branches.
+/// and how far they are from its lowest corner, in parts of it, eight bits an axis. Loops without
+/// branches, of which the compiler makes vectors.
 struct ScanSorter::LanesPlaced {
   LanesPlaced(std::span<const Eigen::Vector3f> points_lidar, const PoseInVoxels& pose,
               const Window& window, const VoxelGrid& grid, double max_range_m) {
-    Lanes p_x = Lanes::Zero(), p_y = Lanes::Zero(), p_z = Lanes::Zero();
+    Lanes p_x{}, p_y{}, p_z{};
     for (std::size_t k = 0; k < points_lidar.size(); ++k) {
-      const auto lane = static_cast<Eigen::Index>(k);
-      p_x[lane] = points_lidar[k].x();
-      p_y[lane] = points_lidar[k].y();
-      p_z[lane] = points_lidar[k].z();
+      p_x[k] = points_lidar[k].x();
+      p_y[k] = points_lidar[k].y();
+      p_z[k] = points_lidar[k].z();
     }
-    const Lanes squared_m2 = p_x * p_x + (p_y * p_y + p_z * p_z);
+    WholeLanes is_near;
     const double max_squared_m2 = max_range_m * max_range_m;
-    for (Eigen::Index lane = 0; lane < p_x.size(); ++lane) {
-      // NaN, too: what no whole number holds must not be cast to one.
-      const bool is_far = !(squared_m2[lane] <= max_squared_m2);
-      p_x[lane] = is_far ? 0.0 : p_x[lane];
-      p_y[lane] = is_far ? 0.0 : p_y[lane];
-      p_z[lane] = is_far ? 0.0 : p_z[lane];
-    }
-    constexpr double steps = PackedVoxel::offset_steps;
-    std::array<Lanes, 3> place, whole;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto a = static_cast<Eigen::Index>(axis);
-      place[axis] = pose.x[a] * p_x + pose.y[a] * p_y + pose.z[a] * p_z + pose.origin[a];
-      whole[axis] = place[axis].floor();
-      offset[axis] = ((place[axis] - whole[axis]) * steps).min(steps - 1.0).cast<int>();
-    }
-    // From the window's corner. Half a voxel from a tile's border rounding cannot cross it.
-    const double columns = grid.columns();
-    const Lanes x = whole[0] - columns * window.first.x;
-    const Lanes y = whole[1] - columns * window.first.y;
-    const Lanes row = ((x + 0.5) * (1.0 / columns)).floor();
-    const Lanes column = ((y + 0.5) * (1.0 / columns)).floor();
-    const WholeLanes place_in_window = (row * window.side + column).cast<int>();
-    const WholeLanes voxel_x = (x - row * columns).cast<int>();
-    const WholeLanes voxel_y = (y - column * columns).cast<int>();
-    const WholeLanes voxel_z = whole[2].cast<int>();
     for (std::size_t k = 0; k < lanes; ++k) {
-      const auto lane = static_cast<Eigen::Index>(k);
-      const Eigen::Vector3d in_voxels(place[0][lane], place[1][lane], place[2][lane]);
+      // NaN is not, either: what no whole number holds must not be cast to one.
+      const bool near = p_x[k] * p_x[k] + (p_y[k] * p_y[k] + p_z[k] * p_z[k]) <= max_squared_m2;
+      p_x[k] = near ? p_x[k] : 0.0;
+      p_y[k] = near ? p_y[k] : 0.0;
+      p_z[k] = near ? p_z[k] : 0.0;
+      is_near[k] = near ? 1 : 0;
+    }
+    const double columns = grid.columns();
+    const double tiles_per_column = 1.0 / columns;
+    const double max_voxels = VoxelGrid::max_coordinate_m / grid.voxel_size_m();
+    const double max_layers = grid.max_z_m() / grid.voxel_size_m();
+    const double first_x = columns * window.first.x, first_y = columns * window.first.y;
+    const auto last = static_cast<double>(window.side - 1);
+    for (std::size_t k = 0; k < lanes; ++k) {
+      const double in_x = pose.along(0, p_x[k], p_y[k], p_z[k]);
+      const double in_y = pose.along(1, p_x[k], p_y[k], p_z[k]);
+      const double in_z = pose.along(2, p_x[k], p_y[k], p_z[k]);
+      const double whole_x = std::floor(in_x), whole_y = std::floor(in_y);
+      const double whole_z = std::floor(in_z);
+      offset[k] = part(in_x - whole_x) | part(in_y - whole_y) << 8 | part(in_z - whole_z) << 16;
+      // From the window's corner. Half a voxel from a tile's border rounding cannot cross it.
+      const double x = whole_x - first_x, y = whole_y - first_y;
+      const double row = std::floor((x + 0.5) * tiles_per_column);
+      const double column = std::floor((y + 0.5) * tiles_per_column);
       // Only a transform that is not quite rigid moves a point out of the window.
-      const bool is_mapped = (squared_m2[lane] <= max_squared_m2) & (row[lane] >= 0.0) &
-                             (row[lane] < window.side) & (column[lane] >= 0.0) &
-                             (column[lane] < window.side) &
-                             grid.holds(in_voxels * grid.voxel_size_m());
-      tile[k] = is_mapped ? static_cast<std::uint32_t>(place_in_window[lane]) : no_tile;
-      voxel_key[k] = stillmap::voxel_key({static_cast<std::uint16_t>(voxel_x[lane]),
-                                          static_cast<std::uint16_t>(voxel_y[lane]),
-                                          static_cast<std::int16_t>(voxel_z[lane])});
+      const bool is_held = (row >= 0.0) & (row <= last) & (column >= 0.0) & (column <= last) &
+                           (std::abs(in_x) <= max_voxels) & (std::abs(in_y) <= max_voxels) &
+                           (std::abs(in_z) <= max_layers);
+      const auto place = static_cast<std::int32_t>(row * window.side + column);
+      tile[k] = static_cast<std::uint32_t>(is_held & (is_near[k] != 0) ? place : -1);
+      const auto voxel_x = static_cast<std::int32_t>(x - row * columns);
+      const auto voxel_y = static_cast<std::int32_t>(y - column * columns);
+      const auto voxel_z = static_cast<std::int32_t>(whole_z);
+      voxel_key[k] = static_cast<std::uint32_t>(voxel_x) << 24 |
+                     static_cast<std::uint32_t>(voxel_y) << 16 |
+                     ((static_cast<std::uint32_t>(voxel_z) & 0xFFFFU) ^ 0x8000U);
     }
   }
 
+  static std::int32_t part(double offset) {
+    constexpr double steps = PackedVoxel::offset_steps;
+    return static_cast<std::int32_t>(std::min(offset * steps, steps - 1.0));
+  }
+
   std::array<std::uint32_t, lanes> tile, voxel_key;
-  std::array<WholeLanes, 3> offset;
+  WholeLanes offset;
 };
+static_assert(no_tile == static_cast<std::uint32_t>(-1));
 
 void ScanSorter::index_points(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
                               const Window& window) {
@@ -132,11 +133,10 @@ void ScanSorter::index_some(std::size_t first, std::size_t count, const Labelled
   const bool has_confidence = !scan.labels.confidence.empty();
   for (std::size_t k = 0; k < count; ++k) {
     const std::size_t i = first + k;
-    const auto lane = static_cast<Eigen::Index>(k);
+    const std::int32_t offset = placed.offset[k];
     points[k] = {placed.voxel_key[k],
-                 {static_cast<std::uint8_t>(placed.offset[0][lane]),
-                  static_cast<std::uint8_t>(placed.offset[1][lane]),
-                  static_cast<std::uint8_t>(placed.offset[2][lane])},
+                 {static_cast<std::uint8_t>(offset), static_cast<std::uint8_t>(offset >> 8),
+                  static_cast<std::uint8_t>(offset >> 16)},
                  has_labels ? scan.labels.classes[i] : SemanticClass::unlabeled,
                  motion[k],
                  false,

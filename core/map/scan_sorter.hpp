@@ -36,11 +36,19 @@ class ScanSorter {
     std::int32_t side = 0;
   };
 
-  /// The pose in voxels: place = x p.x + y p.y + z p.z + origin.
-  struct PoseInVoxels {
+  /// The pose in voxels.
+  class PoseInVoxels {
+   public:
     PoseInVoxels(const Eigen::Isometry3d& T_map_lidar, double voxel_size_m);
 
-    Eigen::Array3d x, y, z, origin;
+    /// A coordinate of a point's place in the map [voxels].
+    [[nodiscard]] double along(Eigen::Index axis, double x, double y, double z) const {
+      return in_voxels_(axis, 0) * x + in_voxels_(axis, 1) * y + in_voxels_(axis, 2) * z +
+             in_voxels_(axis, 3);
+    }
+
+   private:
+    Eigen::Matrix<double, 3, 4> in_voxels_;
   };
 
   struct LanesPlaced;

@@ -37,6 +37,8 @@ class VoxelGrid {
   [[nodiscard]] double tile_size_m() const { return voxel_size_m_ * columns_; }
   /// Voxels along the side of a tile.
   [[nodiscard]] int columns() const { return columns_; }
+  /// Nothing higher or lower than this has a voxel.
+  [[nodiscard]] double max_z_m() const { return max_z_m_; }
 
   struct Index {
     TileId tile;
