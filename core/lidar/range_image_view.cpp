@@ -243,7 +243,8 @@ class RangeImageView::Places {
         half_columns_(0.5F * static_cast<float>(view.columns_)),
         last_row_(static_cast<float>(view.rows_ - 1)),
         last_column_(static_cast<float>(view.columns_ - 1)),
-        columns_(view.columns_) {}
+        columns_(view.columns_),
+        T_lidar_map_(view.T_lidar_map_.affine()) {}
 
   struct Place {
     float range_m, row, column;
@@ -265,6 +266,13 @@ class RangeImageView::Places {
         whole(256.0F * (place.column - static_cast<float>(place.whole_column)), 255.0F);
     return place;
   }
+  [[nodiscard]] Place of_map(const Eigen::Vector3f& p_map) const {
+    const auto along = [&](Eigen::Index axis) {
+      return T_lidar_map_(axis, 0) * p_map.x() + T_lidar_map_(axis, 1) * p_map.y() +
+             T_lidar_map_(axis, 2) * p_map.z() + T_lidar_map_(axis, 3);
+    };
+    return of(along(0), along(1), along(2));
+  }
   [[nodiscard]] std::uint32_t pixel(const Place& place) const {
     return static_cast<std::uint32_t>(place.whole_row * columns_ + place.whole_column);
   }
@@ -272,6 +280,7 @@ class RangeImageView::Places {
  private:
   float rows_per_rad_, fov_up_, half_columns_, last_row_, last_column_;
   int columns_;
+  Eigen::Matrix<float, 3, 4> T_lidar_map_;
 };
 
 RangeImageView::RowRange RangeImageView::project(std::span<const Eigen::Vector3f> points_lidar,
@@ -301,18 +310,6 @@ RangeImageView::RowRange RangeImageView::project(std::span<const Eigen::Vector3f
     high = std::max(high, rows_high[i]);
   }
   return {from_ordered(low), from_ordered(high)};
-}
-
-std::optional<RangeImageView::Direction> RangeImageView::direction_of(
-    const Eigen::Vector3f& point_lidar, float range_m) const {
-  const auto place = Places(*this).of(point_lidar.x(), point_lidar.y(), point_lidar.z());
-  const bool is_seen =
-      range_m > 0.0F && place.row >= seen_rows_.first && place.row <= seen_rows_.last;
-  if (!is_seen) return std::nullopt;
-  return Direction{.row = place.whole_row,
-                   .column = place.whole_column,
-                   .below_row_top = static_cast<std::uint8_t>(place.below_row_top),
-                   .in_column = static_cast<std::uint8_t>(place.in_column)};
 }
 
 float RangeImageView::next_range_m(int row, int column, int step) const {
@@ -426,18 +423,44 @@ bool RangeImageView::has_beam_near(const Observation& point, float distance_m) c
 
 std::optional<RangeImageView::Observation> RangeImageView::observe(
     const Eigen::Vector3f& point_map) const {
-  const Eigen::Vector3f point_lidar = T_lidar_map_ * point_map;
-  Observation observation{};
-  observation.point_range_m = point_lidar.norm();
-  const std::optional<Direction> at = direction_of(point_lidar, observation.point_range_m);
-  if (!at) return std::nullopt;
-  const float pixel = pixels_[index(at->row, at->column)];
+  const auto place = Places(*this).of_map(point_map);
+  const bool is_seen =
+      place.range_m > 0.0F && place.row >= seen_rows_.first && place.row <= seen_rows_.last;
+  if (!is_seen) return std::nullopt;
+  const float pixel = pixels_[index(place.whole_row, place.whole_column)];
   if (pixel == 0.0F) return std::nullopt;
-  observation.range_m = std::abs(pixel);
-  observation.movable = pixel > 0.0F;
-  observation.direction_map = (point_map - origin_map_) / observation.point_range_m;
-  observation.at = *at;
-  return observation;
+  return Observation{.range_m = std::abs(pixel),
+                     .movable = pixel > 0.0F,
+                     .point_range_m = place.range_m,
+                     .at = {.row = place.whole_row,
+                            .column = place.whole_column,
+                            .below_row_top = static_cast<std::uint8_t>(place.below_row_top),
+                            .in_column = static_cast<std::uint8_t>(place.in_column)}};
+}
+
+void RangeImageView::mark_measured_behind(std::span<const Eigen::Vector3f> points_map,
+                                          const Behind& behind,
+                                          std::span<std::uint8_t> is_measured) const {
+  const Places places(*this);
+  const RowRange seen_rows = seen_rows_;
+  // Ranges are rounded here and where sees_past() is asked.
+  constexpr float room = 1.0F - 1e-5F;
+  constexpr float never_m = std::numeric_limits<float>::infinity();
+  std::array<std::uint32_t, batch_size> pixels;
+  std::array<float, batch_size> beyond_m;
+  for (std::size_t first = 0; first < points_map.size(); first += batch_size) {
+    const auto batch = points_map.subspan(first, std::min(batch_size, points_map.size() - first));
+    for (std::size_t k = 0; k < batch.size(); ++k) {
+      const auto place = places.of_map(batch[k]);
+      const bool is_seen = (place.range_m > 0.0F) & (room * place.range_m <= behind.max_range_m) &
+                           (place.row >= seen_rows.first) & (place.row <= seen_rows.last);
+      pixels[k] = places.pixel(place);
+      const float range_m = place.range_m + behind.distance_m + behind.share * place.range_m;
+      beyond_m[k] = is_seen ? room * range_m : never_m;
+    }
+    for (std::size_t k = 0; k < batch.size(); ++k)
+      is_measured[first + k] = std::abs(pixels_[pixels[k]]) > beyond_m[k] ? 1 : 0;
+  }
 }
 
 }  // namespace stillmap

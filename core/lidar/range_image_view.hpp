@@ -40,12 +40,23 @@ class RangeImageView {
     bool movable;
     /// From this view's lidar to the point [m].
     float point_range_m;
-    Eigen::Vector3f direction_map;
     Direction at;
   };
   /// Empty where nothing was measured, and beyond the outermost beams: half a row below the lowest
   /// one the ground is already nearer than what that one hit.
   [[nodiscard]] std::optional<Observation> observe(const Eigen::Vector3f& point_map) const;
+
+  /// How far behind a point returns must be for the rays to have passed it: so far and this share
+  /// of the point's range, of points up to a range.
+  struct Behind {
+    float distance_m = 0.0F;
+    float share = 0.0F;
+    float max_range_m = std::numeric_limits<float>::infinity();
+  };
+  /// Of many points at once (map frame [m]): 0 where nothing was measured so far behind a point in
+  /// its own direction, so that sees_past() would not hold either, else 1. Within rounding.
+  void mark_measured_behind(std::span<const Eigen::Vector3f> points_map, const Behind& behind,
+                            std::span<std::uint8_t> is_measured) const;
 
   /// Whether all returns around a point are farther than a range: those of the beams that pass
   /// above and below it, as far to the sides as rows are apart, one column at least.
@@ -104,8 +115,6 @@ class RangeImageView {
                    Returns& returns) const;
   /// Of each pixel the nearest return.
   void fill(const Returns& returns, std::span<const SemanticClass> labels);
-  [[nodiscard]] std::optional<Direction> direction_of(const Eigen::Vector3f& point_lidar,
-                                                      float range_m) const;
   [[nodiscard]] std::size_t index(int row, int column) const {
     return static_cast<std::size_t>(row * columns_ + column);
   }

@@ -214,38 +214,6 @@ void LiveTile::exclude(Excluded& voxel, const TilePoint& point, std::uint32_t sc
   voxel.last_scan = scan;
 }
 
-bool LiveTile::clear_seen_through(const VisibilityTest& test, std::uint32_t scan,
-                                  const VisibilityRule& rule) {
-  bool hides_one = false;
-  const auto look_at = [&](LiveVoxel& voxel) {
-    if (voxel.packed.point_count == 0 || voxel.is_restored != 0) return;
-    const bool is_new = voxel.first_scan > test.last_scan_cleared && test.times_free_before;
-    if (voxel.last_scan == scan && !is_new) return;
-    if (test.only_hit_before_ns &&
-        test.stamps->stamp_ns(voxel.last_scan) >= *test.only_hit_before_ns)
-      return;
-    const Eigen::Vector3f position_map = mean_map(voxel);
-    const Thin thin_by = thin(voxel);
-    std::uint32_t misses = is_new ? test.times_free_before(position_map, thin_by) : 0;
-    const bool was_hidden = is_seen_through(voxel, rule);
-    const bool was_rest = voxel.misses == misses_of_rest;
-    const bool needs_more = !was_hidden || was_rest || !test.only_hides;
-    if (needs_more && voxel.last_scan != scan && test.is_free(position_map, thin_by)) ++misses;
-    if (misses == 0) return;
-    add_misses(voxel, misses);
-    // Where it takes more misses than these.
-    if (was_rest && !is_seen_through(voxel, rule)) voxel.misses = misses_of_rest;
-    if (was_hidden || !is_seen_through(voxel, rule)) return;
-    hides_one = true;
-    if (test.stamps != nullptr) hidden_.push_back(voxel.packed.key);
-  };
-  std::ranges::for_each(sorted_, look_at);
-  std::ranges::for_each(fresh_, look_at);
-  if (test.stamps != nullptr)
-    hides_one |= hide_rest_of_movers(*test.stamps, test.stamps->stamp_ns(scan), rule);
-  return hides_one;
-}
-
 VoxelHistory LiveTile::history(const LiveVoxel& voxel) {
   return {voxel.hits, voxel.misses, voxel.was_shown != 0, voxel.is_restored != 0,
           voxel.is_thin != 0};

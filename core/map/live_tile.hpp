@@ -52,13 +52,26 @@ struct VisibilityRule {
 /// alone hit it (RangeImageView).
 enum class Thin : std::uint8_t { no, by_labels, by_beam };
 
-/// Whether scans saw through a position of the map frame [m]. Of what is thin a ray must have gone
+/// A place that scans may have seen through (map frame [m]). Of what is thin a ray must have gone
 /// through the place itself: those on either side of it tell nothing.
+struct PlaceToClear {
+  /// So many are asked for at once, or fewer.
+  static constexpr std::size_t max_at_once = 128;
+
+  Eigen::Vector3f position_map;
+  Thin thin = Thin::no;
+};
+
+/// Whether scans saw through places.
 struct VisibilityTest {
-  /// A ray of this scan passed it.
-  std::function<bool(const Eigen::Vector3f& position_map, Thin thin)> is_free;
+  /// Answers for all of these places.
+  using Ask =
+      std::function<void(std::span<const PlaceToClear> places, std::span<std::uint32_t> answers)>;
+
+  /// 1 where a ray of this scan passed it, else 0.
+  Ask is_free;
   /// How many of the scans before it did, of those that are kept; empty: none are.
-  std::function<std::uint32_t(const Eigen::Vector3f& position_map, Thin thin)> times_free_before;
+  Ask times_free_before;
   /// Voxels that no scan hit until this one are asked how often they were free before.
   std::uint32_t last_scan_cleared = 0;
   /// Of what is hidden already this scan counts no miss: looks that follow each other at once tell
@@ -207,6 +220,7 @@ class LiveTile {
   /// for all points that follow each other in a voxel.
   [[nodiscard]] LikelyPositions prefetch_voxels(std::span<const TilePoint> points) const;
   static void hit(LiveVoxel& voxel, const TilePoint& point, std::uint32_t scan);
+  class Look;
   static void add_misses(LiveVoxel& voxel, std::uint32_t misses);
   /// Of objects that moved on, only those voxels are seen through that a ray happens to pass: hides
   /// the rest, from those that clearing has hidden on to all that touch. True when it hides one.

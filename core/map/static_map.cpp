@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <deque>
 #include <limits>
@@ -56,8 +57,11 @@ struct StaticMap::State {
   /// Whether a ray of the view passed this position.
   [[nodiscard]] bool sees_through(const RangeImageView& view, const Eigen::Vector3f& position_map,
                                   Thin thin) const;
-  /// How many of the views that are kept saw through this position.
-  [[nodiscard]] std::uint32_t times_free(const Eigen::Vector3f& position_map, Thin thin) const;
+  /// The same of many: 1 or 0 each.
+  void find_seen_through(const RangeImageView& view, std::span<const PlaceToClear> places,
+                         std::span<std::uint32_t> is_free) const;
+  /// How many of the views that are kept saw through each of these.
+  void count_times_free(std::span<const PlaceToClear> places, std::span<std::uint32_t> times) const;
   /// Whether the map begins: there is hardly a view yet that tells what was free before.
   [[nodiscard]] bool begins() const {
     return !max_earlier_scans && !is_resumed && config.clearing_interval > 1 &&
@@ -118,10 +122,31 @@ bool StaticMap::State::sees_through(const RangeImageView& view, const Eigen::Vec
          view.has_beam_near(*observation, static_cast<float>(near_voxels * config.voxel_size_m));
 }
 
-std::uint32_t StaticMap::State::times_free(const Eigen::Vector3f& position_map, Thin thin) const {
-  return static_cast<std::uint32_t>(std::ranges::count_if(
-      past_views,
-      [&](const RangeImageView& view) { return sees_through(view, position_map, thin); }));
+void StaticMap::State::find_seen_through(const RangeImageView& view,
+                                         std::span<const PlaceToClear> places,
+                                         std::span<std::uint32_t> is_free) const {
+  // Most are settled by what was measured in their own direction.
+  const RangeImageView::Behind behind{
+      .distance_m = static_cast<float>(std::max(config.clearing_margin_m, config.voxel_size_m)),
+      .share = static_cast<float>(config.clearing_margin_share),
+      .max_range_m = static_cast<float>(config.clearing_range_m)};
+  std::array<Eigen::Vector3f, PlaceToClear::max_at_once> positions_map;
+  std::array<std::uint8_t, PlaceToClear::max_at_once> is_measured;
+  for (std::size_t k = 0; k < places.size(); ++k) positions_map[k] = places[k].position_map;
+  view.mark_measured_behind(std::span(positions_map).first(places.size()), behind, is_measured);
+  for (std::size_t k = 0; k < places.size(); ++k)
+    is_free[k] =
+        is_measured[k] != 0 && sees_through(view, places[k].position_map, places[k].thin) ? 1 : 0;
+}
+
+void StaticMap::State::count_times_free(std::span<const PlaceToClear> places,
+                                        std::span<std::uint32_t> times) const {
+  std::ranges::fill(times, 0U);
+  std::array<std::uint32_t, PlaceToClear::max_at_once> is_free;
+  for (const RangeImageView& view : past_views) {
+    find_seen_through(view, places, is_free);
+    for (std::size_t k = 0; k < places.size(); ++k) times[k] += is_free[k];
+  }
 }
 
 void StaticMap::State::enter_session(std::span<LiveTile* const> changing) {
@@ -212,10 +237,14 @@ void StaticMap::clear_seen_through(RangeImageView view, std::int64_t stamp_ns, C
   const bool clears_all = what == Clearing::all;
   state_->last_origin_map = view.origin_map();
   const VisibilityTest test{
-      .is_free = [&](const Eigen::Vector3f& p_map,
-                     Thin thin) { return state_->sees_through(view, p_map, thin); },
-      .times_free_before = [&](const Eigen::Vector3f& p_map,
-                               Thin thin) { return state_->times_free(p_map, thin); },
+      .is_free =
+          [&](std::span<const PlaceToClear> places, std::span<std::uint32_t> is_free) {
+            state_->find_seen_through(view, places, is_free);
+          },
+      .times_free_before =
+          [&](std::span<const PlaceToClear> places, std::span<std::uint32_t> times) {
+            state_->count_times_free(places, times);
+          },
       .last_scan_cleared = state_->last_scan_cleared,
       .only_hides = state_->begins(),
       .stamps = &tiles.stamps(),

@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <span>
 
 #include "core/map/live_tile.hpp"
 
@@ -85,6 +87,101 @@ std::optional<RemovalReason> LiveTile::removal(const LiveVoxel& voxel, const Vis
   if (is_shown(voxel, rule) || voxel.packed.point_count < rule.min_points) return std::nullopt;
   if (!is_movable(voxel.packed.evidence.winner())) return RemovalReason::seen_through;
   return voxel.was_shown != 0 ? RemovalReason::relabelled : RemovalReason::semi_static;
+}
+
+/// Voxels that a scan may have seen through, as many as are asked for at once.
+class LiveTile::Look {
+ public:
+  Look(const LiveTile& tile, const VisibilityTest& test, std::uint32_t scan,
+       const VisibilityRule& rule)
+      : tile_(tile), test_(test), scan_(scan), rule_(rule) {}
+
+  /// Takes those that count, until it is full; returns the rest.
+  std::span<LiveVoxel> take(std::span<LiveVoxel> voxels) {
+    std::size_t k = 0;
+    for (; k < voxels.size() && count_ < voxels_.size(); ++k)
+      if (counts(voxels[k])) voxels_[count_++] = &voxels[k];
+    return voxels.subspan(k);
+  }
+  [[nodiscard]] bool is_full() const { return count_ == voxels_.size(); }
+
+  /// Counts their misses, and calls `hide(voxel)` for each that these hide; empty afterwards.
+  template <typename Hide>
+  void finish(Hide hide) {
+    std::array<std::uint32_t, PlaceToClear::max_at_once> misses{};
+    ask([this](const LiveVoxel& voxel) { return is_new(voxel); }, test_.times_free_before, misses);
+    ask([this](const LiveVoxel& voxel) { return counts_now(voxel); }, test_.is_free, misses);
+    for (std::size_t k = 0; k < count_; ++k) {
+      if (misses[k] == 0) continue;
+      LiveVoxel& voxel = *voxels_[k];
+      const bool was_hidden = is_seen_through(voxel, rule_);
+      const bool was_rest = voxel.misses == misses_of_rest;
+      add_misses(voxel, misses[k]);
+      // Where it takes more misses than these.
+      if (was_rest && !is_seen_through(voxel, rule_)) voxel.misses = misses_of_rest;
+      if (!was_hidden && is_seen_through(voxel, rule_)) hide(voxel);
+    }
+    count_ = 0;
+  }
+
+ private:
+  [[nodiscard]] bool is_new(const LiveVoxel& voxel) const {
+    return voxel.first_scan > test_.last_scan_cleared && test_.times_free_before;
+  }
+  [[nodiscard]] bool counts(const LiveVoxel& voxel) const {
+    if (voxel.packed.point_count == 0 || voxel.is_restored != 0) return false;
+    if (voxel.last_scan == scan_ && !is_new(voxel)) return false;
+    return !test_.only_hit_before_ns ||
+           test_.stamps->stamp_ns(voxel.last_scan) < *test_.only_hit_before_ns;
+  }
+  /// Whether this scan counts, too.
+  [[nodiscard]] bool counts_now(const LiveVoxel& voxel) const {
+    if (voxel.last_scan == scan_) return false;
+    return !test_.only_hides || !is_seen_through(voxel, rule_) || voxel.misses == misses_of_rest;
+  }
+  /// Adds to `misses` what is answered for those of which `is_asked(voxel)` holds.
+  template <typename IsAsked>
+  void ask(IsAsked is_asked, const VisibilityTest::Ask& of,
+           std::array<std::uint32_t, PlaceToClear::max_at_once>& misses) const {
+    std::array<PlaceToClear, PlaceToClear::max_at_once> places;
+    std::array<std::uint32_t, PlaceToClear::max_at_once> asked, answers;
+    std::uint32_t count = 0;
+    for (std::uint32_t k = 0; k < count_; ++k) {
+      if (!is_asked(*voxels_[k])) continue;
+      places[count] = {tile_.mean_map(*voxels_[k]), thin(*voxels_[k])};
+      asked[count++] = k;
+    }
+    if (count == 0) return;
+    of(std::span(places).first(count), std::span(answers).first(count));
+    for (std::uint32_t k = 0; k < count; ++k) misses[asked[k]] += answers[k];
+  }
+
+  const LiveTile& tile_;
+  const VisibilityTest& test_;
+  std::uint32_t scan_;
+  const VisibilityRule& rule_;
+  std::array<LiveVoxel*, PlaceToClear::max_at_once> voxels_;
+  std::size_t count_ = 0;
+};
+
+bool LiveTile::clear_seen_through(const VisibilityTest& test, std::uint32_t scan,
+                                  const VisibilityRule& rule) {
+  bool hides_one = false;
+  const auto hide = [&](const LiveVoxel& voxel) {
+    hides_one = true;
+    if (test.stamps != nullptr) hidden_.push_back(voxel.packed.key);
+  };
+  Look look(*this, test, scan, rule);
+  for (auto* const voxels : {&sorted_, &fresh_}) {
+    for (std::span<LiveVoxel> rest(*voxels); !rest.empty();) {
+      rest = look.take(rest);
+      if (look.is_full()) look.finish(hide);
+    }
+  }
+  look.finish(hide);
+  if (test.stamps != nullptr)
+    hides_one |= hide_rest_of_movers(*test.stamps, test.stamps->stamp_ns(scan), rule);
+  return hides_one;
 }
 
 }  // namespace stillmap

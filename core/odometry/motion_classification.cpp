@@ -110,8 +110,9 @@ PastObservation RangeImageHistory::observation(std::size_t age, const Eigen::Vec
   if (past.lies_on_surface(*observation, same_surface_m)) return PastObservation::same;
   const float gap = observation->point_range_m - observation->range_m;
   if (gap < margin(observation->range_m) || gap > max_gone_gap_m) return PastObservation::unknown;
-  const Eigen::Vector3f surface_map =
-      past.origin_map() + observation->range_m * observation->direction_map;
+  const Eigen::Vector3f direction_map =
+      (point_map - past.origin_map()) / observation->point_range_m;
+  const Eigen::Vector3f surface_map = past.origin_map() + observation->range_m * direction_map;
   return sees_through(now, surface_map) ? PastObservation::removed_in_front
                                         : PastObservation::unknown;
 }

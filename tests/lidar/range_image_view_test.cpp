@@ -247,5 +247,38 @@ TEST(RangeImageView, KnowsNoSurfaceBetweenTwoThings) {
   }
 }
 
+/// Of many at once as of each by itself.
+TEST(RangeImageView, WhatIsNotMeasuredBehindIsNotSeenPast) {
+  const ScatteredPoints points(11);
+  const Eigen::Isometry3d T_map_lidar =
+      Eigen::Translation3d(20.0, -7.0, 1.5) *
+      Eigen::AngleAxisd(0.7, Eigen::Vector3d(0.1, 0.2, 1.0).normalized());
+  const RangeImageView view(points.scan, {}, one_degree_lidar(), T_map_lidar);
+  std::mt19937 random(12);
+  std::normal_distribution<float> coordinate_m(0.0F, 15.0F);
+  std::vector<Eigen::Vector3f> asked_map;
+  for (int i = 0; i < 3001; ++i)
+    asked_map.push_back(view.origin_map() + Eigen::Vector3f(coordinate_m(random),
+                                                            coordinate_m(random),
+                                                            0.2F * coordinate_m(random)));
+  asked_map.push_back(view.origin_map());
+  asked_map.push_back(Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
+  const RangeImageView::Behind behind{.distance_m = 0.5F, .share = 0.02F, .max_range_m = 20.0F};
+  std::vector<std::uint8_t> is_measured(asked_map.size());
+  view.mark_measured_behind(asked_map, behind, is_measured);
+  int ruled_out = 0, seen_past = 0;
+  for (std::size_t i = 0; i < asked_map.size(); ++i) {
+    const auto seen = view.observe(asked_map[i]);
+    const float range_m = seen ? seen->point_range_m : 0.0F;
+    const float beyond_m = range_m + behind.distance_m + behind.share * range_m;
+    const bool is_far = range_m > behind.max_range_m;
+    EXPECT_EQ(is_measured[i] != 0, seen && !is_far && seen->range_m > beyond_m) << i;
+    ruled_out += is_measured[i] == 0 ? 1 : 0;
+    seen_past += seen && view.sees_past(*seen, beyond_m) && !is_far ? 1 : 0;
+  }
+  EXPECT_GT(ruled_out, 500);
+  EXPECT_GT(seen_past, 10);
+}
+
 }  // namespace
 }  // namespace stillmap

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/map/storage/tile_codec.hpp"
+#include "tests/map/ask_each.hpp"
 
 namespace stillmap {
 namespace {
@@ -45,11 +46,10 @@ bool every_fourth_is_free(const Eigen::Vector3f& position_map, Thin) {
 
 /// Of earlier scans some passed what is new.
 VisibilityTest visibility_after(std::uint32_t last_scan_cleared) {
-  return {.is_free = every_fourth_is_free,
-          .times_free_before =
-              [](const Eigen::Vector3f& position_map, Thin) {
-                return static_cast<std::uint32_t>(std::floor(position_map.y() * -5.0F)) % 3;
-              },
+  return {.is_free = ask_each(every_fourth_is_free),
+          .times_free_before = ask_each([](const Eigen::Vector3f& position_map, Thin) {
+            return static_cast<std::uint32_t>(std::floor(position_map.y() * -5.0F)) % 3;
+          }),
           .last_scan_cleared = last_scan_cleared};
 }
 
@@ -122,14 +122,14 @@ TEST(LiveTile, CountsTheMissesOfLaterScansAndOfThoseKeptBefore) {
     }
     tile.insert(points, stamps.add(scan));
     const VisibilityTest test{
-        .is_free = [&](const Eigen::Vector3f& p_map, Thin) { return is_free_in(scan, p_map); },
-        .times_free_before =
-            [&](const Eigen::Vector3f& p_map, Thin) {
-              std::uint32_t times = 0;
-              for (std::uint32_t age = 1; age <= std::min(scan, kept_scans); ++age)
-                times += is_free_in(scan - age, p_map) ? 1 : 0;
-              return times;
-            },
+        .is_free =
+            ask_each([&](const Eigen::Vector3f& p_map, Thin) { return is_free_in(scan, p_map); }),
+        .times_free_before = ask_each([&](const Eigen::Vector3f& p_map, Thin) {
+          std::uint32_t times = 0;
+          for (std::uint32_t age = 1; age <= std::min(scan, kept_scans); ++age)
+            times += is_free_in(scan - age, p_map) ? 1 : 0;
+          return times;
+        }),
         .last_scan_cleared = scan == 0 ? 0 : scan - 1};
     (void)tile.clear_seen_through(test, scan, rule);
   }
@@ -158,9 +158,10 @@ TEST(LiveTile, OnlyASureClassTakesMoreMissesToClear) {
     TilePoint point = point_in(voxel_key({7, 8, 1}), label);
     point.confidence = confidence;
     for (int i = 0; i < hits; ++i) tile.insert(std::array{point}, stamps.add(i));
-    const VisibilityTest test{.is_free = [](const Eigen::Vector3f&, Thin) { return true; },
-                              .times_free_before = {},
-                              .last_scan_cleared = 0};
+    const VisibilityTest test{
+        .is_free = ask_each([](const Eigen::Vector3f&, Thin) { return true; }),
+        .times_free_before = {},
+        .last_scan_cleared = 0};
     for (std::uint32_t miss = 0; miss < misses; ++miss)
       (void)tile.clear_seen_through(test, stamps.add(hits + 10 + miss), rule);
     (void)tile.publish(1, rule, stamps);
@@ -193,7 +194,7 @@ TEST(LiveTile, WhatOneBeamAloneHitIsThinInItsRecordToo) {
           decode_evidence(encode_evidence(*record.evidence), live_grid))};
   LiveTile reloaded(live_id, stored, live_grid, stamps);
   const VisibilityTest test{
-      .is_free = [](const Eigen::Vector3f&, Thin thin) { return thin == Thin::no; },
+      .is_free = ask_each([](const Eigen::Vector3f&, Thin thin) { return thin == Thin::no; }),
       .times_free_before = {},
       .last_scan_cleared = 0};
   for (std::uint32_t miss = 0; miss < 10; ++miss)

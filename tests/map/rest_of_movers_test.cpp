@@ -7,6 +7,7 @@
 
 #include "core/map/live_tile.hpp"
 #include "core/map/storage/tile_codec.hpp"
+#include "tests/map/ask_each.hpp"
 
 namespace stillmap {
 namespace {
@@ -32,12 +33,12 @@ class RestOfMovers : public testing::Test {
   void scan(const std::vector<TilePoint>& points, const std::set<int>& free_columns = {}) {
     const std::uint32_t number = stamps_.add(clock_offset_ns_ + movers_period_ns * ++scans_);
     tile_->insert(points, number);
-    const VisibilityTest test{
-        .is_free = [&](const Eigen::Vector3f& p_map,
-                       Thin) { return free_columns.contains(static_cast<int>(p_map.x() / 0.2F)); },
-        .times_free_before = {},
-        .last_scan_cleared = number,
-        .stamps = &stamps_};
+    const VisibilityTest test{.is_free = ask_each([&](const Eigen::Vector3f& p_map, Thin) {
+                                return free_columns.contains(static_cast<int>(p_map.x() / 0.2F));
+                              }),
+                              .times_free_before = {},
+                              .last_scan_cleared = number,
+                              .stamps = &stamps_};
     static_cast<void>(tile_->clear_seen_through(test, number, movers_rule));
   }
   /// Scans that hit nothing.
