@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
+#include <cstring>
 #include <utility>
 
 #include "core/lidar/voxel_index.hpp"
@@ -123,44 +125,49 @@ class CubeBatch {
 
   explicit CubeBatch(float inverse_spacing) : inverse_spacing_(inverse_spacing) {}
 
-  /// At most `capacity` of them.
-  void place(std::span<const Eigen::Vector3f> points, std::span<const std::uint32_t> some) {
-    Block x = Block::Zero(), y = Block::Zero(), z = Block::Zero();
+  /// At most `capacity` of them. Returns a bit for each that lies in another cube than the one
+  /// before, of the last batch for the first.
+  [[nodiscard]] std::uint64_t place(std::span<const Eigen::Vector3f> points,
+                                    std::span<const std::uint32_t> some) {
+    std::array<float, capacity> x{}, y{}, z{};
     for (std::size_t k = 0; k < some.size(); ++k) {
-      const auto lane = static_cast<Eigen::Index>(k);
       const Eigen::Vector3f& p = points[some[k]];
-      x[lane] = p.x();
-      y[lane] = p.y();
-      z[lane] = p.z();
+      x[k] = p.x();
+      y[k] = p.y();
+      z[k] = p.z();
     }
     for (auto* const cubes : {&x_, &y_, &z_}) (*cubes)[0] = (*cubes)[last_];
-    x_.tail<capacity>() = (x * inverse_spacing_).floor().cast<int>();
-    y_.tail<capacity>() = (y * inverse_spacing_).floor().cast<int>();
-    z_.tail<capacity>() = (z * inverse_spacing_).floor().cast<int>();
-    last_ = static_cast<Eigen::Index>(some.size());
+    last_ = some.size();
     for (std::size_t k = 0; k < capacity; ++k) {
-      const auto lane = static_cast<Eigen::Index>(k);
-      differs_[k] =
-          (x_[lane] ^ x_[lane + 1]) | (y_[lane] ^ y_[lane + 1]) | (z_[lane] ^ z_[lane + 1]);
+      x_[k + 1] = static_cast<std::int32_t>(std::floor(x[k] * inverse_spacing_));
+      y_[k + 1] = static_cast<std::int32_t>(std::floor(y[k] * inverse_spacing_));
+      z_[k + 1] = static_cast<std::int32_t>(std::floor(z[k] * inverse_spacing_));
     }
+    std::array<std::uint8_t, capacity> differs;
+    for (std::size_t k = 0; k < capacity; ++k)
+      differs[k] = ((x_[k] ^ x_[k + 1]) | (y_[k] ^ y_[k + 1]) | (z_[k] ^ z_[k + 1])) != 0 ? 1 : 0;
+    std::uint64_t bits = 0;
+    for (std::size_t first = 0; first < capacity; first += 8) {
+      // Eight bytes that are 0 or 1 become the upper eight bits of a product.
+      static_assert(std::endian::native == std::endian::little);
+      std::uint64_t bytes;
+      std::memcpy(&bytes, &differs[first], sizeof(bytes));
+      bits |= (bytes * 0x0102040810204080ULL >> 56U) << first;
+    }
+    return some.size() == capacity ? bits : bits & ((std::uint64_t{1} << some.size()) - 1);
   }
-  /// Whether the k-th lies in another cube than the one before, of the last batch for the first.
-  [[nodiscard]] bool is_next(std::size_t k) const { return differs_[k] != 0; }
-  /// Its packed index.
+  /// The packed index of the k-th.
   [[nodiscard]] std::uint64_t cube(std::size_t k) const {
-    const auto lane = static_cast<Eigen::Index>(k) + 1;
-    return packed_index(x_[lane], y_[lane], z_[lane]);
+    return packed_index(x_[k + 1], y_[k + 1], z_[k + 1]);
   }
 
  private:
-  using Block = Eigen::Array<float, static_cast<int>(capacity), 1>;
-  using Cubes = Eigen::Array<int, static_cast<int>(capacity) + 1, 1>;
+  using Cubes = std::array<std::int32_t, capacity + 1>;
 
   float inverse_spacing_;
   /// From the second on; the first ones are the last of the batch before.
-  Cubes x_ = Cubes::Zero(), y_ = Cubes::Zero(), z_ = Cubes::Zero();
-  Eigen::Index last_ = 0;
-  std::array<int, capacity> differs_;
+  Cubes x_{}, y_{}, z_{};
+  std::size_t last_ = 0;
 };
 
 /// Points that follow each other in the order of the scan and lie in one cube.
@@ -186,9 +193,10 @@ std::vector<Run> runs_in_cubes(std::span<const Eigen::Vector3f> points,
   CubeBatch batch(inverse_spacing);
   for (std::size_t begin = 0; begin < chosen.size(); begin += CubeBatch::capacity) {
     const auto some = chosen.subspan(begin, std::min(CubeBatch::capacity, chosen.size() - begin));
-    batch.place(points, some);
-    for (std::size_t k = 0; k < some.size(); ++k) {
-      if (begin + k > 0 && !batch.is_next(k)) continue;
+    std::uint64_t begins = batch.place(points, some);
+    if (begin == 0) begins |= 1U;
+    for (; begins != 0; begins &= begins - 1) {
+      const auto k = static_cast<std::size_t>(std::countr_zero(begins));
       end_run(begin + k);
       last_cube = batch.cube(k);
     }
