@@ -36,9 +36,8 @@ std::span<const ScanSorter::Batch> ScanSorter::sort(const LabelledScan& scan,
   if (!grid_.holds(lidar_map) || !(T_map_lidar.linear().norm() < 2.0)) return {};
   const TileId centre = grid_.index(lidar_map).tile;
   const Window window{{centre.x - reach_tiles_, centre.y - reach_tiles_}, 2 * reach_tiles_ + 1};
-  index_points(scan, T_map_lidar, window);
-  for (std::size_t i = 0; i < is_thin.size(); ++i) placed_[i].is_thin = is_thin[i] != 0;
-  group_by_tile(window);
+  index_points(scan.scan, T_map_lidar, window);
+  group_by_tile(scan, is_thin, window);
   return batches_;
 }
 
@@ -57,22 +56,24 @@ struct ScanSorter::LanesPlaced {
       p_y[k] = points_lidar[k].y();
       p_z[k] = points_lidar[k].z();
     }
-    WholeLanes is_near;
     const double max_squared_m2 = max_range_m * max_range_m;
+    std::array<double, lanes> is_near;
     for (std::size_t k = 0; k < lanes; ++k) {
       // NaN is not, either: what no whole number holds must not be cast to one.
-      const bool near = p_x[k] * p_x[k] + (p_y[k] * p_y[k] + p_z[k] * p_z[k]) <= max_squared_m2;
-      p_x[k] = near ? p_x[k] : 0.0;
-      p_y[k] = near ? p_y[k] : 0.0;
-      p_z[k] = near ? p_z[k] : 0.0;
-      is_near[k] = near ? 1 : 0;
+      const double x = p_x[k], y = p_y[k], z = p_z[k];
+      const bool near = x * x + (y * y + z * z) <= max_squared_m2;
+      is_near[k] = near ? 1.0 : 0.0;
+      p_x[k] = near ? x : 0.0;
+      p_y[k] = near ? y : 0.0;
+      p_z[k] = near ? z : 0.0;
     }
     const double columns = grid.columns();
     const double tiles_per_column = 1.0 / columns;
     const double max_voxels = VoxelGrid::max_coordinate_m / grid.voxel_size_m();
     const double max_layers = grid.max_z_m() / grid.voxel_size_m();
     const double first_x = columns * window.first.x, first_y = columns * window.first.y;
-    const auto last = static_cast<double>(window.side - 1);
+    const auto side = static_cast<double>(window.side);
+    const double last = side - 1.0;
     for (std::size_t k = 0; k < lanes; ++k) {
       const double in_x = pose.along(0, p_x[k], p_y[k], p_z[k]);
       const double in_y = pose.along(1, p_x[k], p_y[k], p_z[k]);
@@ -88,8 +89,8 @@ struct ScanSorter::LanesPlaced {
       const bool is_held = (row >= 0.0) & (row <= last) & (column >= 0.0) & (column <= last) &
                            (std::abs(in_x) <= max_voxels) & (std::abs(in_y) <= max_voxels) &
                            (std::abs(in_z) <= max_layers);
-      const auto place = static_cast<std::int32_t>(row * window.side + column);
-      tile[k] = static_cast<std::uint32_t>(is_held & (is_near[k] != 0) ? place : -1);
+      const double place = is_held & (is_near[k] > 0.0) ? row * side + column : -1.0;
+      tile[k] = static_cast<std::uint32_t>(static_cast<std::int32_t>(place));
       const auto voxel_x = static_cast<std::int32_t>(x - row * columns);
       const auto voxel_y = static_cast<std::int32_t>(y - column * columns);
       const auto voxel_z = static_cast<std::int32_t>(whole_z);
@@ -109,42 +110,33 @@ struct ScanSorter::LanesPlaced {
 };
 static_assert(no_tile == static_cast<std::uint32_t>(-1));
 
-void ScanSorter::index_points(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
+void ScanSorter::index_points(const Scan& scan, const Eigen::Isometry3d& T_map_lidar,
                               const Window& window) {
-  window_indices_.resize(scan.scan.size());
-  placed_.resize(scan.scan.size());
+  window_indices_.resize(scan.size());
+  voxel_keys_.resize(scan.size());
+  offsets_.resize(scan.size());
   const PoseInVoxels pose(T_map_lidar, grid_.voxel_size_m());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scan.scan.size(), 4096),
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scan.size(), 4096),
                     [&](const tbb::blocked_range<std::size_t>& range) {
                       for (std::size_t i = range.begin(); i < range.end(); i += lanes)
                         index_some(i, std::min(lanes, range.end() - i), scan, pose, window);
                     });
 }
 
-void ScanSorter::index_some(std::size_t first, std::size_t count, const LabelledScan& scan,
+void ScanSorter::index_some(std::size_t first, std::size_t count, const Scan& scan,
                             const PoseInVoxels& pose, const Window& window) {
-  const LanesPlaced placed(std::span(scan.scan.points_lidar).subspan(first, count), pose, window,
-                           grid_, max_range_m_);
-  std::ranges::copy_n(placed.tile.begin(), static_cast<std::ptrdiff_t>(count),
-                      window_indices_.begin() + static_cast<std::ptrdiff_t>(first));
-  const auto points = std::span(placed_).subspan(first, count);
-  const auto motion = std::span(scan.motion).subspan(first, count);
-  const bool has_labels = !scan.labels.empty();
-  const bool has_confidence = !scan.labels.confidence.empty();
-  for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t i = first + k;
-    const std::int32_t offset = placed.offset[k];
-    points[k] = {placed.voxel_key[k],
-                 {static_cast<std::uint8_t>(offset), static_cast<std::uint8_t>(offset >> 8),
-                  static_cast<std::uint8_t>(offset >> 16)},
-                 has_labels ? scan.labels.classes[i] : SemanticClass::unlabeled,
-                 motion[k],
-                 false,
-                 has_confidence ? scan.labels.confidence[i] : 1.0F};
-  }
+  const LanesPlaced placed(std::span(scan.points_lidar).subspan(first, count), pose, window, grid_,
+                           max_range_m_);
+  const auto take = [&](const auto& from, auto& into) {
+    std::copy_n(from.begin(), count, into.begin() + static_cast<std::ptrdiff_t>(first));
+  };
+  take(placed.tile, window_indices_);
+  take(placed.voxel_key, voxel_keys_);
+  take(placed.offset, offsets_);
 }
 
-void ScanSorter::group_by_tile(const Window& window) {
+void ScanSorter::group_by_tile(const LabelledScan& scan, std::span<const std::uint8_t> is_thin,
+                               const Window& window) {
   // Counting sort: stable, so that a tile sees its points in the order of the scan.
   begins_.assign(static_cast<std::size_t>(window.side) * static_cast<std::size_t>(window.side) + 1,
                  0);
@@ -153,8 +145,20 @@ void ScanSorter::group_by_tile(const Window& window) {
   }
   std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
   grouped_.resize(begins_.back());
+  const bool has_labels = !scan.labels.empty();
+  const bool has_confidence = !scan.labels.confidence.empty();
   for (std::size_t i = 0; i < window_indices_.size(); ++i) {
-    if (window_indices_[i] != no_tile) grouped_[begins_[window_indices_[i]]++] = placed_[i];
+    const std::uint32_t place = window_indices_[i];
+    if (place == no_tile) continue;
+    const std::int32_t offset = offsets_[i];
+    TilePoint& point = grouped_[begins_[place]++];
+    point.voxel_key = voxel_keys_[i];
+    point.offset = {static_cast<std::uint8_t>(offset), static_cast<std::uint8_t>(offset >> 8),
+                    static_cast<std::uint8_t>(offset >> 16)};
+    point.label = has_labels ? scan.labels.classes[i] : SemanticClass::unlabeled;
+    point.motion = scan.motion[i];
+    point.is_thin = !is_thin.empty() && is_thin[i] != 0;
+    point.confidence = has_confidence ? scan.labels.confidence[i] : 1.0F;
   }
   // Every begin has moved on to the end of its tile.
   std::uint32_t begin = 0;

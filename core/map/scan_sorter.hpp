@@ -53,19 +53,20 @@ class ScanSorter {
 
   struct LanesPlaced;
 
-  void index_points(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
-                    const Window& window);
+  void index_points(const Scan& scan, const Eigen::Isometry3d& T_map_lidar, const Window& window);
   /// Of the points from `first` on, of which there are so many at most as are placed at once.
-  void index_some(std::size_t first, std::size_t count, const LabelledScan& scan,
-                  const PoseInVoxels& pose, const Window& window);
-  void group_by_tile(const Window& window);
+  void index_some(std::size_t first, std::size_t count, const Scan& scan, const PoseInVoxels& pose,
+                  const Window& window);
+  void group_by_tile(const LabelledScan& scan, std::span<const std::uint8_t> is_thin,
+                     const Window& window);
 
   VoxelGrid grid_;
   double max_range_m_;
   std::int32_t reach_tiles_;
-  /// Of every point of the scan: its place in the window (`no_tile` when not mapped), its voxel.
-  std::vector<std::uint32_t> window_indices_;
-  std::vector<TilePoint> placed_;
+  /// Of every point of the scan: its place in the window (`no_tile` when not mapped), its voxel,
+  /// and where in it, eight bits an axis.
+  std::vector<std::uint32_t> window_indices_, voxel_keys_;
+  std::vector<std::int32_t> offsets_;
   /// Where each tile of the window begins in `grouped_`, and one past the last.
   std::vector<std::uint32_t> begins_;
   std::vector<TilePoint> grouped_;
