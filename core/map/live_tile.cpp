@@ -40,6 +40,19 @@ std::size_t changed_voxels(std::span<const PackedVoxel> before,
   return changed + static_cast<std::size_t>((before.end() - a) + (after.end() - b));
 }
 
+/// Of one voxel, and the same of it but for the confidence and where in it they are.
+bool are_alike(const TilePoint& a, const TilePoint& b) {
+  return a.voxel_key == b.voxel_key && a.label == b.label && a.motion == b.motion;
+}
+
+/// Of points that have one label.
+void add_votes(ClassEvidence& evidence, std::span<const TilePoint> alike) {
+  std::uint32_t steps = 0;
+  for (const TilePoint& point : alike) steps += ClassEvidence::steps_of_vote(point.confidence);
+  if (evidence.add_at_once(alike.front().label, steps)) return;
+  for (const TilePoint& point : alike) evidence.add(point.label, point.confidence);
+}
+
 }  // namespace
 
 /// Voxels chosen from a tile, and the numbers of the scans that saw them.
@@ -139,16 +152,16 @@ void LiveTile::insert(std::span<const TilePoint> points, std::uint32_t scan,
 
 LiveTile::LikelyPositions LiveTile::prefetch_voxels(std::span<const TilePoint> points) const {
   // Neighbours on a beam mostly share a voxel: asked for once.
-  std::array<std::uint32_t, block_size> keys;
+  std::array<PositionIndex::Start, block_size> starts;
   std::size_t count = 0;
-  for (const TilePoint& point : points) {
-    if (count > 0 && keys[count - 1] == point.voxel_key) continue;
-    keys[count++] = point.voxel_key;
-    index_.prefetch_slot(point.voxel_key);
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    if (k > 0 && points[k].voxel_key == points[k - 1].voxel_key) continue;
+    starts[count] = index_.start_of(points[k].voxel_key);
+    index_.prefetch_slot(starts[count++]);
   }
   LikelyPositions positions;
   for (std::size_t k = 0; k < count; ++k) {
-    positions[k] = index_.likely_position(keys[k]);
+    positions[k] = index_.likely_position(starts[k]);
     if (positions[k] != PositionIndex::none) prefetch(&at(positions[k]));
   }
   return positions;
@@ -160,7 +173,8 @@ void LiveTile::insert_block(std::span<const TilePoint> points, const LikelyPosit
   auto position = positions.begin();
   LiveVoxel* voxel = nullptr;
   Excluded* excluded = nullptr;
-  for (const TilePoint& point : points) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const TilePoint& point = points[i];
     const bool makes_voxel = voxel == nullptr && point.motion == Motion::stationary;
     // Neighbours on a beam mostly share a voxel: no look-up for them.
     if (key != point.voxel_key || makes_voxel) {
@@ -174,7 +188,9 @@ void LiveTile::insert_block(std::span<const TilePoint> points, const LikelyPosit
       }
     }
     if (voxel != nullptr) {
-      hit(*voxel, point, scan);
+      const std::size_t first = i;
+      while (i + 1 < points.size() && are_alike(points[i + 1], point)) ++i;
+      hit(*voxel, points.subspan(first, i + 1 - first), scan);
     } else if (point.motion != Motion::stationary) {
       if (excluded == nullptr) excluded = &excluded_[point.voxel_key];
       exclude(*excluded, point, scan);
@@ -182,16 +198,16 @@ void LiveTile::insert_block(std::span<const TilePoint> points, const LikelyPosit
   }
 }
 
-void LiveTile::hit(LiveVoxel& voxel, const TilePoint& point, std::uint32_t scan) {
+void LiveTile::hit(LiveVoxel& voxel, std::span<const TilePoint> alike, std::uint32_t scan) {
+  const Motion motion = alike.front().motion;
   // A moving object says nothing about the voxel that it passes.
-  if (point.motion == Motion::highly_dynamic) return;
+  if (motion == Motion::highly_dynamic) return;
   PackedVoxel& packed = voxel.packed;
   if (packed.point_count == 0) voxel.first_scan = scan;
   const bool is_new_scan = packed.point_count == 0 || voxel.last_scan != scan;
-  packed.evidence.add(point.label, point.confidence);
+  add_votes(packed.evidence, alike);
   voxel.last_scan = scan;
-  if (point.motion == Motion::semi_static) return;
-  if (point.is_thin) voxel.is_thin = 1;
+  if (motion == Motion::semi_static) return;
   // That it is seen again says that it was no part of what moved on.
   if (is_new_scan && voxel.misses == misses_of_rest) voxel.misses = 0;
   if (is_new_scan && voxel.hits < max_count) {
@@ -199,13 +215,17 @@ void LiveTile::hit(LiveVoxel& voxel, const TilePoint& point, std::uint32_t scan)
     // What stays where space was free for long becomes part of the static world in the end.
     if (voxel.hits % hits_to_settle == 0) voxel.misses = (voxel.misses / 2U) & 0x1FFFU;
   }
-  if (packed.point_count < PackedVoxel::max_mean_points) {
+  const std::uint32_t of_mean = PackedVoxel::max_mean_points - packed.mean_points();
+  for (const TilePoint& point : alike.first(std::min<std::size_t>(alike.size(), of_mean))) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       packed.offset_sum[axis] =
           static_cast<std::uint16_t>(packed.offset_sum[axis] + point.offset[axis]);
     }
   }
-  if (packed.point_count < max_count) ++packed.point_count;
+  for (const TilePoint& point : alike)
+    if (point.is_thin) voxel.is_thin = 1;
+  packed.point_count = static_cast<std::uint16_t>(
+      std::min<std::size_t>(max_count, packed.point_count + alike.size()));
 }
 
 void LiveTile::exclude(Excluded& voxel, const TilePoint& point, std::uint32_t scan) {

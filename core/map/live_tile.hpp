@@ -219,7 +219,8 @@ class LiveTile {
   /// Asks for the memory of the voxels that these points hit. Returns their likely positions, one
   /// for all points that follow each other in a voxel.
   [[nodiscard]] LikelyPositions prefetch_voxels(std::span<const TilePoint> points) const;
-  static void hit(LiveVoxel& voxel, const TilePoint& point, std::uint32_t scan);
+  /// Counts points of a voxel that have one label and motion.
+  static void hit(LiveVoxel& voxel, std::span<const TilePoint> alike, std::uint32_t scan);
   class Look;
   static void add_misses(LiveVoxel& voxel, std::uint32_t misses);
   /// Of objects that moved on, only those voxels are seen through that a ray happens to pass: hides

@@ -32,16 +32,24 @@ class PositionIndex {
     return none;
   }
 
+  /// Where a key is looked for first.
+  struct Start {
+    std::size_t slot = 0;
+    std::uint32_t tag = 0;
+  };
+  [[nodiscard]] Start start_of(std::uint32_t key) const {
+    const std::uint64_t hash = IndexHash{}(key);
+    return {first_slot(hash), tag(hash)};
+  }
   /// Asks for the memory in which the key will be looked for.
-  void prefetch_slot(std::uint32_t key) const {
-    if (!slots_.empty()) prefetch(&slots_[first_slot(IndexHash{}(key))]);
+  void prefetch_slot(const Start& start) const {
+    if (!slots_.empty()) prefetch(&slots_[start.slot]);
   }
   /// The position that the key most likely has, or `none`: its entry is not looked at.
-  [[nodiscard]] std::uint32_t likely_position(std::uint32_t key) const {
+  [[nodiscard]] std::uint32_t likely_position(const Start& start) const {
     if (slots_.empty()) return none;
-    const std::uint64_t hash = IndexHash{}(key);
-    for (std::size_t slot = first_slot(hash); slots_[slot] != 0; slot = next(slot)) {
-      if (slots_[slot] >> 24 == tag(hash)) return (slots_[slot] & position_mask) - 1;
+    for (std::size_t slot = start.slot; slots_[slot] != 0; slot = next(slot)) {
+      if (slots_[slot] >> 24 == start.tag) return (slots_[slot] & position_mask) - 1;
     }
     return none;
   }

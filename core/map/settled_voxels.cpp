@@ -70,7 +70,7 @@ bool LiveTile::add_to_settled(const TilePoint& point, std::uint32_t scan,
   if (best == nullptr) return false;
   TilePoint of_it = point;
   of_it.offset = best_offset;
-  hit(*best, of_it, scan);
+  hit(*best, std::span(&of_it, 1), scan);
   return true;
 }
 

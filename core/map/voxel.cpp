@@ -25,8 +25,7 @@ void ClassEvidence::set_label(std::size_t i, SemanticClass label) {
                                              static_cast<int>(label) << shift);
 }
 
-void ClassEvidence::add(SemanticClass added, float weight) {
-  if (added == SemanticClass::unlabeled || !(weight > 0.0F)) return;
+void ClassEvidence::add_steps(SemanticClass added, std::uint32_t steps) {
   std::size_t vote = 0;
   while (vote < candidates && label(vote) != added) ++vote;
   if (vote == candidates) {
@@ -36,12 +35,21 @@ void ClassEvidence::add(SemanticClass added, float weight) {
         static_cast<std::size_t>(std::ranges::min_element(bits_.weights) - bits_.weights.begin());
     set_label(vote, added);
   }
-  // Rounded without the library's call: every point of a scan comes here.
-  constexpr float parts_per_weight = 1.0F / (vote_steps * weight_step);
-  const int parts = static_cast<int>(std::min(weight, 1.0F) * parts_per_weight + 0.5F);
-  const int steps = std::max(1, parts * vote_steps);
   bits_.weights[vote] = static_cast<std::uint16_t>(bits_.weights[vote] + steps);
+}
+
+void ClassEvidence::add(SemanticClass added, float weight) {
+  const std::uint32_t steps = steps_of_vote(weight);
+  if (added == SemanticClass::unlabeled || steps == 0) return;
+  add_steps(added, steps);
   if (total() > max_steps) scale_down();
+}
+
+bool ClassEvidence::add_at_once(SemanticClass added, std::uint32_t steps) {
+  if (added == SemanticClass::unlabeled || steps == 0) return true;
+  if (total() + steps > max_steps) return false;
+  add_steps(added, steps);
+  return true;
 }
 
 void ClassEvidence::scale_down() {

@@ -37,6 +37,17 @@ class ClassEvidence {
   /// Adds `weight` (a confidence, 0..1) for `label`, which replaces the weakest candidate when it
   /// is none yet. `unlabeled` and weights that are not positive are ignored.
   void add(SemanticClass label, float weight);
+  /// The same of several votes for `label` that count so many steps together (steps_of_vote), where
+  /// none of them would scale the votes down; false, and nothing is added, where one would.
+  [[nodiscard]] bool add_at_once(SemanticClass label, std::uint32_t steps);
+  /// How many steps a vote of this weight counts; none of one that is ignored.
+  [[nodiscard]] static std::uint32_t steps_of_vote(float weight) {
+    if (!(weight > 0.0F)) return 0;
+    // Rounded without the library's call: every point of a scan comes here.
+    constexpr float parts_per_weight = 1.0F / (vote_steps * weight_step);
+    const int parts = static_cast<int>(std::min(weight, 1.0F) * parts_per_weight + 0.5F);
+    return static_cast<std::uint32_t>(std::max(1, parts * vote_steps));
+  }
   /// The class with most evidence, `unlabeled` without any.
   [[nodiscard]] SemanticClass winner() const {
     const std::size_t best = strongest();
@@ -108,6 +119,8 @@ class ClassEvidence {
                                       class_mask);
   }
   void set_label(std::size_t i, SemanticClass label);
+  /// To the candidate of this label, made where there is none.
+  void add_steps(SemanticClass label, std::uint32_t steps);
   [[nodiscard]] std::uint32_t total() const {
     return std::uint32_t{bits_.weights[0]} + bits_.weights[1] + bits_.weights[2];
   }

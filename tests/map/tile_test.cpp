@@ -67,6 +67,29 @@ TEST(ClassEvidence, FrequentClassIsFoundAmongManyRareOnes) {
   EXPECT_EQ(evidence.winner(), traffic_sign);
 }
 
+TEST(ClassEvidence, VotesAtOnceCountAsOneAfterTheOther) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> confidence(-0.2F, 1.2F);
+  ClassEvidence at_once, one_by_one;
+  int refused = 0;
+  for (int run = 0; run < 2000; ++run) {
+    const auto label = static_cast<SemanticClass>(random() % 6);
+    std::vector<float> votes(1 + random() % 5);
+    std::uint32_t steps = 0;
+    for (float& vote : votes) {
+      vote = confidence(random);
+      steps += ClassEvidence::steps_of_vote(vote);
+      one_by_one.add(label, vote);
+    }
+    if (!at_once.add_at_once(label, steps)) {
+      ++refused;
+      for (const float vote : votes) at_once.add(label, vote);
+    }
+    ASSERT_EQ(at_once, one_by_one) << run;
+  }
+  EXPECT_GT(refused, 100);
+}
+
 TEST(ClassEvidence, LongStandingClassTurnsAfterSustainedContraryEvidence) {
   ClassEvidence evidence;
   for (int i = 0; i < 1'000'000; ++i) evidence.add(road, 1.0F);
