@@ -172,19 +172,23 @@ void RangeImageView::fill(const Returns& returns, std::span<const SemanticClass>
   constexpr std::uint64_t may_move = 1U << 16U;
   // And one for returns that are in no pixel.
   std::vector<std::uint64_t> words(pixels_.size() + 1, empty);
-  for (std::size_t i = 0; i < returns.pixels.size(); ++i) {
+  const std::size_t count = returns.pixels.size();
+  for (std::size_t i = 0; i < count; ++i) {
     std::uint64_t& word = words[returns.pixels[i]];
     const bool is_movable_one = !labels.empty() && is_movable(labels[i]);
     const std::uint64_t found = std::uint64_t{std::bit_cast<std::uint32_t>(returns.ranges_m[i])}
                                     << 32U |
                                 (is_movable_one ? may_move : 0U) | returns.places[i];
-    word = found >> 32U < word >> 32U ? found : word;
+    const auto nearer = std::uint64_t{0} - static_cast<std::uint64_t>(found >> 32U < word >> 32U);
+    word ^= (word ^ found) & nearer;
   }
   float* const pixels = pixels_.data();
   std::uint8_t* const below_row_top = below_row_top_.data();
   std::uint8_t* const in_column = in_column_.data();
-  for (std::size_t k = 0; k < pixels_.size(); ++k) {
-    const std::uint64_t word = words[k];
+  const std::uint64_t* const filled = words.data();
+  const std::size_t pixel_count = pixels_.size();
+  for (std::size_t k = 0; k < pixel_count; ++k) {
+    const std::uint64_t word = filled[k];
     const bool is_empty = word == empty;
     const auto range_m = std::bit_cast<float>(static_cast<std::uint32_t>(word >> 32U));
     const float signed_range_m = (word & may_move) != 0 ? range_m : -range_m;
@@ -204,11 +208,15 @@ std::vector<std::uint8_t> RangeImageView::thin_ones(const Returns& returns) cons
       if (may_be_thin[static_cast<std::size_t>(column)] != 0)
         is_thin_at[index(row, column)] = is_thin(row, column) ? 1 : 0;
   }
-  std::vector<std::uint8_t> thin(returns.pixels.size());
-  for (std::size_t i = 0; i < thin.size(); ++i) {
+  const std::size_t count = returns.pixels.size();
+  const std::size_t no_pixel = pixels_.size();
+  std::vector<std::uint8_t> thin(count);
+  std::uint8_t* const marks = thin.data();
+  const std::uint8_t* const is_marked = is_thin_at.data();
+  for (std::size_t i = 0; i < count; ++i) {
     const std::uint32_t pixel = returns.pixels[i];
-    if (pixel == pixels_.size() || is_thin_at[pixel] == 0) continue;
-    thin[i] = returns.ranges_m[i] <= std::abs(pixels_[pixel]) + max_depth_m ? 1 : 0;
+    if (pixel == no_pixel || is_marked[pixel] == 0) continue;
+    marks[i] = returns.ranges_m[i] <= std::abs(pixels_[pixel]) + max_depth_m ? 1 : 0;
   }
   return thin;
 }

@@ -145,20 +145,30 @@ void ScanSorter::group_by_tile(const LabelledScan& scan, std::span<const std::ui
   }
   std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
   grouped_.resize(begins_.back());
-  const bool has_labels = !scan.labels.empty();
-  const bool has_confidence = !scan.labels.confidence.empty();
-  for (std::size_t i = 0; i < window_indices_.size(); ++i) {
-    const std::uint32_t place = window_indices_[i];
-    if (place == no_tile) continue;
-    const std::int32_t offset = offsets_[i];
-    TilePoint& point = grouped_[begins_[place]++];
-    point.voxel_key = voxel_keys_[i];
+  // By pointers of its own: a point has bytes, which as far as the compiler knows may be those of
+  // anything that is reached through an object.
+  const std::uint32_t* const places = window_indices_.data();
+  const std::uint32_t* const keys = voxel_keys_.data();
+  const std::int32_t* const offsets = offsets_.data();
+  const SemanticClass* const labels = scan.labels.empty() ? nullptr : scan.labels.classes.data();
+  const float* const confidence =
+      scan.labels.confidence.empty() ? nullptr : scan.labels.confidence.data();
+  const Motion* const motion = scan.motion.data();
+  const std::uint8_t* const thin = is_thin.empty() ? nullptr : is_thin.data();
+  std::uint32_t* const next = begins_.data();
+  TilePoint* const grouped = grouped_.data();
+  const std::size_t count = window_indices_.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (places[i] == no_tile) continue;
+    const std::int32_t offset = offsets[i];
+    TilePoint& point = grouped[next[places[i]]++];
+    point.voxel_key = keys[i];
     point.offset = {static_cast<std::uint8_t>(offset), static_cast<std::uint8_t>(offset >> 8),
                     static_cast<std::uint8_t>(offset >> 16)};
-    point.label = has_labels ? scan.labels.classes[i] : SemanticClass::unlabeled;
-    point.motion = scan.motion[i];
-    point.is_thin = !is_thin.empty() && is_thin[i] != 0;
-    point.confidence = has_confidence ? scan.labels.confidence[i] : 1.0F;
+    point.label = labels != nullptr ? labels[i] : SemanticClass::unlabeled;
+    point.motion = motion[i];
+    point.is_thin = thin != nullptr && thin[i] != 0;
+    point.confidence = confidence != nullptr ? confidence[i] : 1.0F;
   }
   // Every begin has moved on to the end of its tile.
   std::uint32_t begin = 0;

@@ -9,13 +9,16 @@ namespace stillmap {
 
 RingOrder::RingOrder(const Scan& scan) : order_(scan.size()) {
   assert(scan.ring.size() == scan.size());
-  const std::size_t rings =
-      scan.empty() ? 0 : std::size_t{*std::ranges::max_element(scan.ring)} + 1;
+  std::uint16_t last_ring = 0;
+  for (const std::uint16_t ring : scan.ring) last_ring = std::max(last_ring, ring);
+  const std::size_t rings = scan.empty() ? 0 : std::size_t{last_ring} + 1;
   begin_.assign(rings + 1, 0);
   for (const std::uint16_t ring : scan.ring) ++begin_[ring + 1U];
   std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
   std::vector<std::uint32_t> next(begin_.begin(), begin_.end());
-  for (std::uint32_t i = 0; i < scan.size(); ++i) order_[next[scan.ring[i]]++] = i;
+  const std::span<std::uint32_t> order(order_);
+  const auto count = static_cast<std::uint32_t>(scan.size());
+  for (std::uint32_t i = 0; i < count; ++i) order[next[scan.ring[i]]++] = i;
 }
 
 float ray_step_rad(std::span<const Eigen::Vector3f> ring_lidar) {

@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 
 #include "core/odometry/ring_order.hpp"
@@ -46,13 +47,13 @@ Eigen::Vector3f tangent_at(const std::vector<Eigen::Vector3f>& points,
 std::vector<Eigen::Vector3f> ring_tangents(const Scan& scan, std::span<const std::uint32_t> chosen,
                                            std::size_t max_steps) {
   std::vector<Eigen::Vector3f> tangents(scan.size(), Eigen::Vector3f::Zero());
-  std::vector<bool> is_chosen(scan.size());
-  for (const std::uint32_t i : chosen) is_chosen[i] = true;
+  std::vector<std::uint8_t> is_chosen(scan.size());
+  for (const std::uint32_t i : chosen) is_chosen[i] = 1;
   const RingOrder rings(scan);
   tbb::parallel_for(std::size_t{0}, rings.count(), [&](std::size_t r) {
     const auto ring = rings.ring(r);
     for (std::size_t at = 0; at < ring.size(); ++at)
-      if (is_chosen[ring[at]])
+      if (is_chosen[ring[at]] != 0)
         tangents[ring[at]] = tangent_at(scan.points_lidar, ring, at, max_steps);
   });
   return tangents;
