@@ -169,6 +169,7 @@ LiveTile::LikelyPositions LiveTile::prefetch_voxels(std::span<const TilePoint> p
 
 void LiveTile::insert_block(std::span<const TilePoint> points, const LikelyPositions& positions,
                             std::uint32_t scan, const SettledVoxels* settled) {
+  const std::size_t size_before = size();
   std::optional<std::uint32_t> key;
   auto position = positions.begin();
   LiveVoxel* voxel = nullptr;
@@ -181,7 +182,10 @@ void LiveTile::insert_block(std::span<const TilePoint> points, const LikelyPosit
       const bool is_next = key != point.voxel_key;
       key = point.voxel_key;
       excluded = nullptr;
-      voxel = find(point.voxel_key, is_next ? *position++ : PositionIndex::none);
+      const std::uint32_t likely = is_next ? *position++ : PositionIndex::none;
+      // Where no position was likely there was no voxel, and since then none has come.
+      const bool is_unknown = is_next && likely == PositionIndex::none && size() == size_before;
+      voxel = is_unknown ? nullptr : find(point.voxel_key, likely);
       if (voxel == nullptr) {
         if (settled != nullptr && add_to_settled(point, scan, *settled)) continue;
         voxel = make(point);
