@@ -4,25 +4,13 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "core/lidar/voxel_index.hpp"
 
 namespace stillmap {
 namespace {
-
-/// Those whose class may move, without branches: of many labels these are anybody's guess.
-std::vector<std::uint32_t> movable_points(std::span<const SemanticClass> labels) {
-  std::vector<std::uint32_t> points(labels.size());
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < labels.size(); ++i) {
-    points[count] = static_cast<std::uint32_t>(i);
-    count += is_movable(labels[i]) ? 1 : 0;
-  }
-  points.resize(count);
-  return points;
-}
 
 /// 0 vehicle, 1 person, 2 two-wheeler or its rider.
 std::uint64_t kind_of(SemanticClass label) {
@@ -133,21 +121,18 @@ ObjectClusters cluster_objects(std::span<const Eigen::Vector3f> points_lidar,
   const auto inverse_gap = static_cast<float>(1.0 / gap_m);
   CubeTable table;
   std::vector<Cube> cubes;
-  std::uint64_t last_key = 0;
+  std::optional<std::uint64_t> last_key;
   std::int32_t last_cube = ObjectClusters::none;
-  objects.movable_points = movable_points(labels);
-  for (const std::uint32_t i : objects.movable_points) {
+  for (std::size_t i = 0; i < points_lidar.size(); ++i) {
+    if (!is_movable(labels[i])) continue;
     const float z_m = points_lidar[i].z();
-    const auto along = [&](Eigen::Index axis) {
-      return static_cast<int>(std::floor(points_lidar[i][axis] * inverse_gap));
-    };
-    const Eigen::Vector3i index(along(0), along(1), along(2));
-    const std::uint64_t kind = kind_of(labels[i]);
-    const std::uint64_t key = key_of(index, kind);
+    const Cube cube{(points_lidar[i] * inverse_gap).array().floor().cast<int>(), kind_of(labels[i]),
+                    z_m, z_m};
+    const std::uint64_t key = key_of(cube.index, cube.kind);
     // Points that were measured one after the other mostly share a cube.
-    if (last_cube == ObjectClusters::none || key != last_key) {
+    if (key != last_key) {
       const auto [entry, is_new] = table.try_emplace(key, static_cast<std::uint32_t>(cubes.size()));
-      if (is_new) cubes.push_back({index, kind, z_m, z_m});
+      if (is_new) cubes.push_back(cube);
       last_key = key;
       last_cube = static_cast<std::int32_t>(entry->second);
     }
@@ -157,6 +142,7 @@ ObjectClusters cluster_objects(std::span<const Eigen::Vector3f> points_lidar,
     ++own.points;
     own.cars += labels[i] == SemanticClass::car ? 1 : 0;
     objects.of_point[i] = last_cube;
+    objects.movable_points.push_back(static_cast<std::uint32_t>(i));
   }
   Sets sets(cubes.size());
   join_neighbours(cubes, table, sets);
