@@ -137,6 +137,10 @@ void RangeImageView::measure(const Scan& scan, std::span<const SemanticClass> la
         return all;
       },
       wider);
+  // The points themselves, there and back through the map frame, are within.
+  constexpr float rounding_rows = 1e-3F;
+  seen_rows_.first -= rounding_rows;
+  seen_rows_.last += rounding_rows;
   fill(returns, labels);
 }
 
