@@ -124,7 +124,7 @@ relocalize: build ## Places of another day and of other cities, looked for in a 
 	@for sensor in VLP-16 HDL-64E; do \
 	  $(BUILD)/tests/bench/relocalization_bench --sensor $$sensor --folder $(BUILD) --scans 950 --seeds 1,2 --places 200 || exit 1; done
 
-drives: programs ## Every drive, simulated and in RECORDINGS=FOLDER, into tests/README.md: hours; goes on where it stopped
+drives: programs ## Every drive, simulated and in RECORDINGS=FOLDER, into tests/drives/README.md: hours; goes on where it stopped
 	@/usr/bin/python3 tests/drives/drives.py --program $(BUILD)/bin/stillmap --results $(BUILD)/drives \
 	  $(if $(RECORDINGS),--recordings $(RECORDINGS)) $(DRIVES)
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Runs every drive, simulated and recorded, and writes the table into tests/README.md.
+"""Runs every drive, simulated and recorded, and writes the tables into tests/drives/README.md.
 
   tests/drives/drives.py --program build/release/bin/stillmap --results build/release/drives
 
@@ -189,8 +189,8 @@ def parse(words):
     parser.add_argument("--quick", action="store_true", help="2 seeds of 60 scans")
     parser.add_argument("--fresh", action="store_true", help="Run what is finished again")
     parser.add_argument("--list", action="store_true", help="Print the runs' names")
-    parser.add_argument("--page", type=pathlib.Path, default=ROOT / "tests/README.md",
-                        help="Page that the table goes into; '-' prints it")
+    parser.add_argument("--page", type=pathlib.Path, default=ROOT / "tests/drives/README.md",
+                        help="Page that the tables go into; '-' prints it")
     return parser.parse_args(words)
 
 
