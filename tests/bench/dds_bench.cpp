@@ -1,5 +1,5 @@
 // Throughput and latency of 2 MB scans from one process to others, and of region queries, on the
-// networks that one machine can play. Prints the tables of tests/README.md.
+// networks that one machine can play. Prints tables of tests/network/README.md.
 #include <sys/resource.h>
 
 #include <algorithm>
