@@ -18,6 +18,7 @@
 #include "core/mapper.hpp"
 #include "core/segmentation/segmenter.hpp"
 #include "core/simulation/simulation.hpp"
+#include "tests/bench/bench_program.hpp"
 
 namespace stillmap::bench {
 namespace {
@@ -191,28 +192,13 @@ int run(int argc, char** argv) {
   root.option("--sensor", arguments.sensor, "hdl_64e, hdl_32e, vlp_16 or a sensor file")
       .with_default();
   root.explain(
-      "Ten scans are mapped at the drive's own velocity; the next one is taken by a lidar that "
-      "has\n"
-      "moved further by the error, in a direction that differs between trials. Success: within\n"
-      "0.1 m and 0.5 deg of the truth, and not called lost.");
-  switch (line.parse(argc, argv)) {
-    case cli::CommandLine::Parsed::command:
-      print_table(arguments);
-      return 0;
-    case cli::CommandLine::Parsed::answered:
-      return 0;
-    case cli::CommandLine::Parsed::wrong_usage:
-      break;
-  }
-  return 2;
+      "Ten scans are mapped at the drive's own velocity; the next one is taken by a lidar that has "
+      "moved further by the error, in a direction that differs between trials. Success: within 0.1 "
+      "m and 0.5 deg of the truth, and not called lost.");
+  return run_program(line, argc, argv, [&] { print_table(arguments); });
 }
 
 }  // namespace
 }  // namespace stillmap::bench
 
-int main(int argc, char** argv) try {
-  return stillmap::bench::run(argc, argv);
-} catch (const std::exception& error) {
-  std::fprintf(stderr, "registration_basin_bench: %s\n", error.what());
-  return 1;
-}
+int main(int argc, char** argv) { return stillmap::bench::run(argc, argv); }

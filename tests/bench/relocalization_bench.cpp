@@ -20,6 +20,7 @@
 #include "core/mapper.hpp"
 #include "core/segmentation/segmenter.hpp"
 #include "core/simulation/simulation.hpp"
+#include "tests/bench/bench_program.hpp"
 
 namespace stillmap::bench {
 namespace {
@@ -133,6 +134,57 @@ struct Ride {
   double turned_deg = 0.0;
 };
 
+/// The places that were found beside the true one.
+struct PlaceErrors {
+  /// Of the first one; -1 where there is none.
+  double first_m = -1.0;
+  double first_deg = -1.0;
+  /// The first one that is right, by its place in the list; -1: none is.
+  int rank_of_right = -1;
+};
+
+PlaceErrors errors_of(const LocalizationResult& result, const Eigen::Isometry3d& T_map_lidar_true,
+                      bool is_same_city) {
+  PlaceErrors errors;
+  for (std::size_t p = 0; p < result.places.size(); ++p) {
+    const Eigen::Isometry3d off = T_map_lidar_true.inverse() * result.places[p].T_map_lidar;
+    const double off_m = off.translation().norm();
+    const double off_rad = Eigen::AngleAxisd(off.linear()).angle();
+    if (p == 0) {
+      errors.first_m = off_m;
+      errors.first_deg = off_rad / rad_per_deg;
+    }
+    const bool is_right = is_same_city && off_m < max_error_m && off_rad < max_error_rad;
+    if (is_right && errors.rank_of_right < 0) errors.rank_of_right = static_cast<int>(p);
+  }
+  return errors;
+}
+
+void count(LocalizationStatus status, const PlaceErrors& errors, Tally& tally) {
+  switch (status) {
+    case LocalizationStatus::found:
+      ++(errors.rank_of_right == 0 ? tally.right : tally.wrong);
+      break;
+    case LocalizationStatus::ambiguous:
+      ++tally.ambiguous;
+      break;
+    default:
+      ++tally.not_found;
+  }
+}
+
+void print_place(int scan, const LocalizationResult& result, const PlaceErrors& errors, double ms) {
+  std::printf("  scan %4d %-10s rank %2d err %7.2f m %6.2f deg", scan, name(result.status),
+              errors.rank_of_right, errors.first_m, errors.first_deg);
+  for (std::size_t p = 0; p < std::min<std::size_t>(2, result.places.size()); ++p) {
+    const PlaceHypothesis& h = result.places[p];
+    std::printf(" | %.3f e %.2f c %.2f l %.2f s %.2f n %d/%d", h.evidence.score(),
+                h.evidence.explained, h.evidence.confirmed, h.evidence.level, h.search_score,
+                h.evidence.scan_points, h.evidence.map_points);
+  }
+  std::printf(" %.0f ms\n", ms);
+}
+
 Tally localize_places(const Arguments& arguments, const Localizer& localizer,
                       const FirstRound& round, const simulation::SimulationConfig& config,
                       bool is_same_city, const Ride& ride) {
@@ -154,42 +206,10 @@ Tally localize_places(const Arguments& arguments, const Localizer& localizer,
     const auto start = Clock::now();
     const LocalizationResult result = localizer.localize(scan, labels);
     tally.times_ms.push_back(milliseconds_since(start));
-    double error_m = -1.0;
-    double error_deg = -1.0;
-    bool is_right = false;
-    int rank = -1;
-    const Eigen::Isometry3d T_expected = round.expected(simulated.T_map_lidar);
-    for (std::size_t p = 0; p < result.places.size(); ++p) {
-      const Eigen::Isometry3d off = T_expected.inverse() * result.places[p].T_map_lidar;
-      const double angle = Eigen::AngleAxisd(off.linear()).angle();
-      const bool is_near =
-          is_same_city && off.translation().norm() < max_error_m && angle < max_error_rad;
-      if (is_near && rank < 0) rank = static_cast<int>(p);
-      if (p > 0) continue;
-      error_m = off.translation().norm();
-      error_deg = angle / rad_per_deg;
-      is_right = is_near;
-    }
-    switch (result.status) {
-      case LocalizationStatus::found:
-        ++(is_right ? tally.right : tally.wrong);
-        break;
-      case LocalizationStatus::ambiguous:
-        ++tally.ambiguous;
-        break;
-      default:
-        ++tally.not_found;
-    }
-    if (!arguments.is_verbose) continue;
-    std::printf("  scan %4d %-10s rank %2d err %7.2f m %6.2f deg", index, name(result.status), rank,
-                error_m, error_deg);
-    for (std::size_t p = 0; p < std::min<std::size_t>(2, result.places.size()); ++p) {
-      const PlaceHypothesis& h = result.places[p];
-      std::printf(" | %.3f e %.2f c %.2f l %.2f s %.2f n %d/%d", h.evidence.score(),
-                  h.evidence.explained, h.evidence.confirmed, h.evidence.level, h.search_score,
-                  h.evidence.scan_points, h.evidence.map_points);
-    }
-    std::printf(" %.0f ms\n", tally.times_ms.back());
+    const PlaceErrors errors =
+        errors_of(result, round.expected(simulated.T_map_lidar), is_same_city);
+    count(result.status, errors, tally);
+    if (arguments.is_verbose) print_place(index, result, errors, tally.times_ms.back());
   }
   return tally;
 }
@@ -205,7 +225,7 @@ void print(const std::string& what, Tally tally) {
   std::fflush(stdout);
 }
 
-int print_table(const Arguments& arguments) {
+void print_table(const Arguments& arguments) {
   std::printf(
       "| places                                           | right| wrong| ambig| none | inside | "
       "ms med | ms max |\n");
@@ -230,7 +250,6 @@ int print_table(const Arguments& arguments) {
     config.seed += 1000;
     print(name + ", another city", localize_places(arguments, localizer, round, config, false, {}));
   }
-  return 0;
 }
 
 int run(int argc, char** argv) {
@@ -247,23 +266,10 @@ int run(int argc, char** argv) {
   root.flag("--without-labels", arguments.without_labels, "Scans without labels");
   root.flag("--unlabelled-map", arguments.unlabelled_map, "A map made without labels");
   root.flag("--verbose", arguments.is_verbose, "A line for each place");
-  switch (line.parse(argc, argv)) {
-    case cli::CommandLine::Parsed::command:
-      return print_table(arguments);
-    case cli::CommandLine::Parsed::answered:
-      return 0;
-    case cli::CommandLine::Parsed::wrong_usage:
-      break;
-  }
-  return 2;
+  return run_program(line, argc, argv, [&] { print_table(arguments); });
 }
 
 }  // namespace
 }  // namespace stillmap::bench
 
-int main(int argc, char** argv) try {
-  return stillmap::bench::run(argc, argv);
-} catch (const std::exception& error) {
-  std::fprintf(stderr, "relocalization_bench: %s\n", error.what());
-  return 1;
-}
+int main(int argc, char** argv) { return stillmap::bench::run(argc, argv); }
