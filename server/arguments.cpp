@@ -22,16 +22,14 @@ namespace stillmap::server {
 namespace {
 
 constexpr const char* footer =
-    "Scans come in as sensor_msgs/PointCloud2 on rt/points; poses, tiles, clouds and the status "
-    "go\n"
-    "out under rt/stillmap/, as ROS 2 topics.\n"
+    "Scans come in as sensor_msgs/PointCloud2 on rt/points; poses, tiles, clouds and the status\n"
+    "go out under rt/stillmap/, as ROS 2 topics.\n"
     "\n"
     "Examples:\n"
-    "  stillmap-server                                    any one lidar, domain 0, map not "
-    "kept\n"
+    "  stillmap-server                                   any one lidar, domain 0, map not kept\n"
     "  stillmap-server --config config/server/default.yaml --map-file city.stillmap\n"
-    "  stillmap-server --delivery every                   for 'stillmap replay --lossless'\n"
-    "  stillmap-server --check-config my_server.yaml      every fault of a file, or none\n"
+    "  stillmap-server --delivery every                  for 'stillmap replay --lossless'\n"
+    "  stillmap-server --check-config my_server.yaml     every fault of a file, or none\n"
     "Then, elsewhere: stillmap replay DATASET, stillmap watch, stillmap query, stillmap status.\n"
     "SIGINT, SIGTERM and SIGHUP save the map and end the server with exit code 0.";
 

@@ -167,12 +167,9 @@ void add_options(stillmap::cli::CommandHandle command, Arguments& arguments) {
       "  stillmap-gateway --listen 0.0.0.0:8765 --token-file token --tls-certificate host.pem \\\n"
       "      --tls-key host.key\n"
       "A client of the server like any other: it may run on another machine. Lichtblick and "
-      "Foxglove\n"
-      "connect as 'Foxglove WebSocket' with the address that it prints. A client that is slower "
-      "than\n"
-      "the data gets the newest of it, small messages before large ones, and is told what it "
-      "missed;\n"
-      "http://127.0.0.1:8765/gateway.json counts it.");
+      "Foxglove connect as 'Foxglove WebSocket' with the address that it prints. A client that is "
+      "slower than the data gets the newest of it, small messages before large ones, and is told "
+      "what it missed; http://127.0.0.1:8765/gateway.json counts it.");
 }
 
 }  // namespace

@@ -174,6 +174,24 @@ std::string of_environment(const CLI::App& app, const std::string& fault,
   return {};
 }
 
+/// Examples stay whole, so that they can be copied.
+std::string wrapped(const std::string& text) {
+  constexpr std::size_t width = 92;
+  std::istringstream lines(text);
+  std::string wrapped;
+  for (std::string line; std::getline(lines, line);) {
+    while (line.size() > width && !line.starts_with(' ')) {
+      const std::size_t blank = line.rfind(' ', width);
+      if (blank == std::string::npos) break;
+      wrapped += line.substr(0, blank) + "\n";
+      line.erase(0, blank + 1);
+    }
+    wrapped += line + "\n";
+  }
+  if (!wrapped.empty()) wrapped.pop_back();
+  return wrapped;
+}
+
 }  // namespace
 
 OptionHandle OptionHandle::required() {
@@ -325,7 +343,7 @@ void CommandHandle::renamed(const std::string& former_name, const std::string& n
       ->group("");  // not in the help
 }
 
-void CommandHandle::explain(const std::string& text) { app_->footer(text); }
+void CommandHandle::explain(const std::string& text) { app_->footer(wrapped(text)); }
 
 CommandHandle CommandHandle::command(const std::string& name, const std::string& help) {
   return CommandHandle(*app_->add_subcommand(name, help));

@@ -82,7 +82,8 @@ class CommandHandle {
   /// Makes an option's former name, with a value, wrong usage that names the new one.
   void renamed(const std::string& former_name, const std::string& name);
 
-  /// Text under the options.
+  /// Text under the options. Lines that begin with a blank are examples and stay as they are;
+  /// others are wrapped.
   void explain(const std::string& text);
   CommandHandle command(const std::string& name, const std::string& help);
   /// One of the commands below it must be named.

@@ -5,6 +5,7 @@
 
 #include <iostream>
 #include <limits>
+#include <sstream>
 #include <streambuf>
 #include <string>
 #include <vector>
@@ -15,6 +16,8 @@
 namespace stillmap::cli {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -204,6 +207,28 @@ TEST(Program, FailsWhereItsHelpCannotBeWritten) {
   std::cout.clear();
   EXPECT_EQ(exit_code, static_cast<int>(ExitCode::failed));
   EXPECT_FALSE(was_run);
+}
+
+TEST(CommandLine, WrapsExplanationsButNoExample) {
+  CommandLine line("program", "1", "help");
+  const std::string example = "  program " + std::string(200, 'x') + " --out file";
+  std::string words = "word";
+  while (words.size() < 250) words += " word";
+  line.root().explain("Examples:\n" + example + "\n" + words + "\nShort lines stay apart.\nSo.");
+  testing::internal::CaptureStdout();
+  ASSERT_EQ(parse(line, {"--help"}), CommandLine::Parsed::answered);
+  std::istringstream help(testing::internal::GetCapturedStdout());
+  std::vector<std::string> lines;
+  for (std::string one; std::getline(help, one);) lines.push_back(one);
+  EXPECT_THAT(lines,
+              AllOf(Contains(example), Contains("Short lines stay apart."), Contains("So.")));
+  std::string joined;
+  for (const std::string& one : lines) {
+    if (!one.starts_with("word")) continue;
+    EXPECT_LE(one.size(), 92U);
+    joined += (joined.empty() ? "" : " ") + one;
+  }
+  EXPECT_EQ(joined, words);
 }
 
 TEST(FrameOption, GoesWithoutItsFirstSlash) {

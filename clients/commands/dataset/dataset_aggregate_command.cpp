@@ -128,10 +128,9 @@ void add_dataset_aggregate_command(CommandHandle dataset, Action& action) {
       "Examples:\n"
       "  stillmap dataset aggregate campus campus.ply\n"
       "  stillmap dataset aggregate sequences/00 block.ply --from 0 --to 500 --every 5 --tile 100\n"
-      "The PLY has x y z intensity, red green blue (of the class), label (SemanticKITTI id),\n"
-      "instance, scan_index and point_index. Edit 'label' (and 'instance'); points may be "
-      "deleted,\n"
-      "reordered and saved as ascii or binary with fields of any type, as long as scan_index and\n"
+      "The PLY has x y z intensity, red green blue (of the class), label (SemanticKITTI id), "
+      "instance, scan_index and point_index. Edit 'label' (and 'instance'); points may be deleted, "
+      "reordered and saved as ascii or binary with fields of any type, as long as scan_index and "
       "point_index stay. All points of the scans are in it: nothing is downsampled.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
@@ -148,9 +147,9 @@ void add_dataset_scatter_command(CommandHandle dataset, Action& action) {
       "Examples:\n"
       "  stillmap dataset scatter campus.ply campus\n"
       "  for tile in campus_x*_y*.ply; do stillmap dataset scatter $tile campus; done\n"
-      "Points are known by scan_index and point_index (also scalar_scan_index, as CloudCompare\n"
-      "writes); those that are gone from the cloud keep their labels. A damaged or foreign cloud\n"
-      "changes nothing. Old labels are kept once, in labels.bak/. Where the editor dropped the\n"
+      "Points are known by scan_index and point_index (also scalar_scan_index, as CloudCompare "
+      "writes); those that are gone from the cloud keep their labels. A damaged or foreign cloud "
+      "changes nothing. Old labels are kept once, in labels.bak/. Where the editor dropped the "
       "field 'instance', points whose class stayed keep their instance.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }

@@ -232,20 +232,17 @@ void add_dataset_export_command(CommandHandle dataset, Action& action) {
       "Examples:\n"
       "  stillmap dataset export my_pcds campus --labels my_model --sensor vlp_16\n"
       "  stillmap dataset export topic:points campus --config server.yaml --scans 600\n"
-      "Writes velodyne/*.bin (every scan and point in the order of the source; intensity 0..1),\n"
+      "Writes velodyne/*.bin (every scan and point in the order of the source; intensity 0..1), "
       "labels/*.label (the source's own, else the first guess of --labels, see --drive-votes, of "
-      "the running\n"
-      "server, or 0; for --labels the lidar stands as the mount in the file of --config says, see\n"
-      "--stance), times.txt, calib.txt, and poses.txt\n"
-      "from our odometry: camera frame of scan k into camera frame of scan 0, where calib.txt's\n"
-      "Tr takes lidar to camera (a camera that looks forward from the lidar's place). Point times "
-      "and rings go to time_offsets/ and "
-      "rings/, an IMU's samples and a GNSS receiver's fixes to imu.csv and gnss.csv (not of a live "
-      "topic).\n"
-      "Ctrl-C leaves a shorter sequence that is complete in itself; a new run starts over, as "
-      "poses\n"
-      "follow from all scans before. sensor.yaml is the lidar, for training. Live, give the "
-      "server's own file with --config.");
+      "the running server, or 0; for --labels the lidar stands as the mount in the file of "
+      "--config says, see --stance), times.txt, calib.txt, and poses.txt from our odometry: camera "
+      "frame of scan k into camera frame of scan 0, where calib.txt's Tr takes lidar to camera (a "
+      "camera that looks forward from the lidar's place). Point times and rings go to "
+      "time_offsets/ and rings/, an IMU's samples and a GNSS receiver's fixes to imu.csv and "
+      "gnss.csv (not of a live topic).\n"
+      "Ctrl-C leaves a shorter sequence that is complete in "
+      "itself; a new run starts over, as poses follow from all scans before. sensor.yaml is the "
+      "lidar, for training. Live, give the server's own file with --config.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

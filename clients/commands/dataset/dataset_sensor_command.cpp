@@ -121,15 +121,12 @@ void add_dataset_sensor_command(CommandHandle dataset, Action& action) {
       "  stillmap dataset sensor bag --out my_lidar.yaml\n"
       "  stillmap dataset sensor bag --calibrate --out my_lidar.yaml\n"
       "Reads a scan of usual size: the elevations of its rings, numbered or shown by its points, "
-      "or\n"
-      "where it shows none, the field of view that they fill, in 40 bands. Check the ranges in "
-      "the\n"
-      "file against the sensor's data sheet.\n"
+      "or where it shows none, the field of view that they fill, in 40 bands. Check the ranges in "
+      "the file against the sensor's data sheet.\n"
       "--calibrate drives the first scans once for each of some offsets of elevation, and takes "
-      "the\n"
-      "one with which the map has fewest occupied voxels: vertical angles that are off bend what "
-      "is\n"
-      "seen from farther away. It wants a drive of some 50 m, the sensor's file gets the offset.");
+      "the one with which the map has fewest occupied voxels: vertical angles that are off bend "
+      "what is seen from farther away. It wants a drive of some 50 m, the sensor's file gets the "
+      "offset.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

@@ -47,14 +47,11 @@ constexpr const char* drives_explanation =
     "Examples:\n"
     "  stillmap evaluate drives sim:crowd,seed=2,motion=hard_turns --weightings none semantic\n"
     "  stillmap evaluate drives sim:quiet,rolling,scans=100 --mutate teleport\n"
-    "A pose is wrong when the motion since the last right one is off by more than 0.2 m and 2 % "
-    "of\n"
-    "the path, or 1 deg and 0.02 deg a metre, or since that 20 m back by more than 5 % of the "
-    "path\n"
+    "A pose is wrong when the motion since the last right one is off by more than 0.2 m and 2 % of "
+    "the path, or 1 deg and 0.02 deg a metre, or since that 20 m back by more than 5 % of the path "
     "(less than 20 m on: by 1 m since the first one).\n"
     "Column 'wrong good': wrong poses called good; 'right lost': right ones called lost; ms: a "
-    "scan\n"
-    "without the time for labels, map included. --labels model takes the lidar to be upright.";
+    "scan without the time for labels, map included. --labels model takes the lidar to be upright.";
 
 /// Wrong labels: a share of the points at random, or all of a class.
 void spoil_labels(Scan& scan, const std::string& how, std::size_t index) {

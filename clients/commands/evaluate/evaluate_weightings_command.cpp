@@ -180,9 +180,8 @@ void add_evaluate_weightings_command(CommandHandle evaluate, Action& action) {
       "  stillmap evaluate weightings\n"
       "  stillmap evaluate weightings sim:crowd --seed 3 --scans 400\n"
       "  stillmap evaluate weightings sequences/10\n"
-      "ATE after the best rigid fit; final drift with the first poses aligned. Column "
-      "'none / this'\n"
-      "is the ATE without weighting divided by this ATE.");
+      "ATE after the best rigid fit; final drift with the first poses aligned. Column 'none / "
+      "this' is the ATE without weighting divided by this ATE.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

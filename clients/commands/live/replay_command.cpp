@@ -462,9 +462,9 @@ void add_replay_command(CommandHandle program, Action& action) {
       "  stillmap replay city --lossless --out poses_lidar.txt\n"
       "  stillmap replay city --mount 1.2,0,1.4,0,15,0   # for mount: {source: tf_static}\n"
       "Of a pause in the recording, 10 s are waited at most.\n"
-      "Ends when the server has processed what was sent, and prints the counts. Exit code 1\n"
-      "when a lossless replay lost something or none was mapped, 3 when no server answers or it "
-      "stops taking scans.");
+      "Ends when the server has processed what was sent, and prints the counts. Exit code 1 when a "
+      "lossless replay lost something or none was mapped, 3 when no server answers or it stops "
+      "taking scans.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

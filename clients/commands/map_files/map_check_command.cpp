@@ -83,8 +83,7 @@ void add_map_check_command(CommandHandle program, Action& action) {
       "Examples:\n"
       "  stillmap map-check city.stillmap\n"
       "  stillmap map-check backup.stillmap --json | jq '.faults[] | select(.tile)'\n"
-      "Exit code 0: valid; 1: damaged, each fault is named with its tile; 2: no map file that "
-      "this\n"
+      "Exit code 0: valid; 1: damaged, each fault is named with its tile; 2: no map file that this "
       "version can read.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }

@@ -167,9 +167,8 @@ void add_map_export_command(CommandHandle program, Action& action) {
       "  stillmap map-export city.stillmap -o way.ply --corridor path.txt --width 6 --max-z 2\n"
       "  stillmap map-export city.stillmap -o clean.ply --remove-outliers 3\n"
       "  stillmap map-export city.stillmap -o city.tif --datum 49.011,8.417,115,35\n"
-      "Points are in the map frame [m]. --around-robot is round the end of the stored path. The\n"
-      "GeoTIFF is in the transverse Mercator projection at the datum (WGS 84), which any GIS "
-      "reads\n"
+      "Points are in the map frame [m]. --around-robot is round the end of the stored path. The "
+      "GeoTIFF is in the transverse Mercator projection at the datum (WGS 84), which any GIS reads "
       "from the file.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }

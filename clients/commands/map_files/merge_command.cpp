@@ -197,15 +197,13 @@ void add_merge_command(CommandHandle program, Action& action) {
       "  stillmap merge north.stillmap south.stillmap --out city.stillmap\n"
       "  stillmap merge a.stillmap b.stillmap --out c.stillmap --json | jq "
       "'.closures[].T_map_lidar'\n"
-      "What could be seen along the path of OTHER is looked for in MAP, place by place until some\n"
+      "What could be seen along the path of OTHER is looked for in MAP, place by place until some "
       "agree, then stretch by stretch of 25 m; each voxel moves with the pose that saw it last. "
-      "Both\n"
-      "files are only read; voxels must have one size. What one of the maps alone has stays: a "
-      "map\n"
-      "does not tell where its lidar saw free space. To bring a map up to date, put the newer\n"
-      "recording onto it ('stillmap map --onto'). OTHER is a session of the result, which "
-      "'stillmap\n"
-      "sessions' can withdraw. Exit code 5: it was not recognised, and nothing was written.");
+      "Both files are only read; voxels must have one size. What one of the maps alone has stays: "
+      "a map does not tell where its lidar saw free space. To bring a map up to date, put the "
+      "newer recording onto it ('stillmap map --onto'). OTHER is a session of the result, which "
+      "'stillmap sessions' can withdraw. Exit code 5: it was not recognised, and nothing was "
+      "written.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

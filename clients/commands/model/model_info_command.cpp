@@ -154,8 +154,7 @@ void add_model_run_command(CommandHandle model, Action& action) {
       "  stillmap model run my_model --engine onednn --precision int8 --input x.f32 --output "
       "y.f32\n"
       "Channels are those that 'stillmap model info' lists, normalised as model.yaml says, 0 where "
-      "a\n"
-      "pixel is empty. For comparing engines with the framework that trained the network.");
+      "a pixel is empty. For comparing engines with the framework that trained the network.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

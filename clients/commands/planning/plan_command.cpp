@@ -271,11 +271,10 @@ void add_plan_command(CommandHandle program, Action& action) {
       "  stillmap plan --map city_map/map.stillmap --from 0,0,0 --to 80,-3 --picture path.png\n"
       "  stillmap plan --to 80,-3,180 --output path.csv       from where the robot is\n"
       "  stillmap plan --to 0,0 --follow --picture path.png   until Ctrl-C\n"
-      "The path keeps the robot's whole footprint on free cells and its turning radius\n"
-      "(min_turning_radius_m of the profile); driving backwards costs three times as much.\n"
-      "Exit code 4 when there is no path: start or goal is blocked, no route is known, or the\n"
-      "search ran out of time; with --follow, of the last plan. Then the file of --output stays as "
-      "it\n"
+      "The path keeps the robot's whole footprint on free cells and its turning radius "
+      "(min_turning_radius_m of the profile); driving backwards costs three times as much. Exit "
+      "code 4 when there is no path: start or goal is blocked, no route is known, or the search "
+      "ran out of time; with --follow, of the last plan. Then the file of --output stays as it "
       "was, unless this run has written it: where the path of --follow is blocked, it has none.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }

@@ -97,14 +97,11 @@ void add_locate_command(CommandHandle program, Action& action) {
       "  stillmap locate\n"
       "  stillmap locate --near 12 -3.5 90 --radius 30 --apply\n"
       "  stillmap locate --json | jq .pose.position\n"
-      "The pose is the robot's in the map. It is given only where it is found: ambiguous is a "
-      "scan\n"
+      "The pose is the robot's in the map. It is given only where it is found: ambiguous is a scan "
       "that several places fit, not_found one that none does, no_evidence one that shows too "
-      "little.\n"
-      "Exit code 1 where it is not found. Nothing changes without --apply. A server that is lost\n"
-      "looks for itself ('stillmap status' says how that goes); this is for one that is wrong, "
-      "and\n"
-      "for those who want to know. Scans of a file are found by 'stillmap localize'.");
+      "little. Exit code 1 where it is not found. Nothing changes without --apply. A server that "
+      "is lost looks for itself ('stillmap status' says how that goes); this is for one that is "
+      "wrong, and for those who want to know. Scans of a file are found by 'stillmap localize'.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

@@ -101,13 +101,12 @@ void add_load_command(CommandHandle program, Action& action) {
       "  stillmap load depot.stillmap --json | jq .map_id\n"
       "  stillmap load                               back to the last save\n"
       "The running map is saved to its own file first; only without FILE, or where it is that "
-      "file,\n"
-      "the map goes back to what was saved there last, and what was mapped since is gone; where\n"
-      "somebody put another map in the file's place, it is that map. From then on the\n"
-      "server maps in FILE and saves to it, under a new map id; the next scan is expected where\n"
-      "FILE's path ends, so the robot must stand there. A file that is missing, damaged, written\n"
-      "by a newer version or of another voxel size is refused, and the running map stays. A\n"
-      "server that starts again begins with its configured file.");
+      "file, the map goes back to what was saved there last, and what was mapped since is gone; "
+      "where somebody put another map in the file's place, it is that map. From then on the server "
+      "maps in FILE and saves to it, under a new map id; the next scan is expected where FILE's "
+      "path ends, so the robot must stand there. A file that is missing, damaged, written by a "
+      "newer version or of another voxel size is refused, and the running map stays. A server that "
+      "starts again begins with its configured file.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
@@ -122,8 +121,8 @@ void add_reset_command(CommandHandle program, Action& action) {
       "Examples:\n"
       "  stillmap reset\n"
       "  stillmap reset --json | jq -r .kept_file\n"
-      "The map until now is saved, and its file renamed: city.stillmap is kept beside it as\n"
-      "city.2026-05-31_142500.stillmap, to return to with 'stillmap load'. A server without a map\n"
+      "The map until now is saved, and its file renamed: city.stillmap is kept beside it as "
+      "city.2026-05-31_142500.stillmap, to return to with 'stillmap load'. A server without a map "
       "file keeps nothing: it refuses unless its map was saved by name, or with --discard.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }

@@ -111,8 +111,7 @@ void add_health_command(CommandHandle program, Action& action) {
       "  stillmap health                     is it alive: Docker's HEALTHCHECK, a liveness probe\n"
       "  stillmap health --mapping           does it work: a readiness probe on a driving robot\n"
       "A server that waits for its first scan is alive. One whose checkpoints fail is not well: "
-      "what\n"
-      "it maps is in memory alone.");
+      "what it maps is in memory alone.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

@@ -170,10 +170,9 @@ void add_simulate_training_command(CommandHandle program, Action& action) {
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Every city draws its streets, plants, houses, traffic, materials and its lidar at random, "
-      "harder\n"
-      "than life: 60 % HDL-64E, 20 % VLP-16, 10 % HDL-32E, 10 % sensors that nobody builds, all\n"
-      "with the flaws that real ones have. sequences/SEED/sensor.yaml tells the lidar's rings and\n"
-      "field of view. The same seed gives the same files.\n"
+      "harder than life: 60 % HDL-64E, 20 % VLP-16, 10 % HDL-32E, 10 % sensors that nobody builds, "
+      "all with the flaws that real ones have. sequences/SEED/sensor.yaml tells the lidar's rings "
+      "and field of view. The same seed gives the same files.\n"
       "A run that was stopped can be repeated: complete cities are skipped.\n"
       "Examples:\n"
       "  stillmap simulate-training train --cities 1000\n"
