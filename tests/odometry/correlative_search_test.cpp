@@ -63,6 +63,7 @@ TEST(CorrelativeSearch, KeepsCandidatesApart) {
   const CorrelativeSearchConfig config;
   const auto found = correlative_search(seen_from(landmarks_map, pose(3.0, 4.0, 1.0)),
                                         landmarks_map, pose(0.0, 0.0, 0.0), 16, config);
+  ASSERT_GT(found.size(), 4U);
   for (std::size_t a = 0; a < found.size(); ++a) {
     for (std::size_t b = 0; b < a; ++b) {
       const Eigen::Isometry3d off = found[a].inverse() * found[b];

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/simulation/simulation.hpp"
@@ -108,6 +109,8 @@ TEST(LidarFlaws, BeamErrorsTiltTheBeams) {
   config.flaws.beams.assign(16, {});
   config.flaws.beams[15].elevation_error = 0.02;
   const Scan scan = Simulation(config).scan(0).scan;
+  ASSERT_GT(std::ranges::count(scan.ring, 15), 10);
+  ASSERT_GT(std::ranges::count(scan.ring, 14), 10);
   for (std::size_t i = 0; i < scan.size(); ++i) {
     const Eigen::Vector3f& p = scan.points_lidar[i];
     const double error = scan.ring[i] == 15 ? 0.02 : 0.0;

@@ -1,6 +1,7 @@
 // Properties of the simulated scans of the presets.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
@@ -221,6 +222,8 @@ TEST(QuietCity, GroundUnderTheLidarIsItsHeightBelow) {
 
 TEST(Labels, OnlyObjectsThatCanBeCountedHaveInstances) {
   const SimulatedScan out = Simulation(with_plan(test_yard(), 5)).scan(0);
+  ASSERT_EQ(out.raw_labels.size(), out.scan.size());
+  EXPECT_TRUE(std::ranges::any_of(out.scan.labels, is_movable));
   for (std::size_t i = 0; i < out.raw_labels.size(); ++i) {
     EXPECT_EQ(out.raw_labels[i] >> 16U != 0, is_movable(out.scan.labels[i]));
   }

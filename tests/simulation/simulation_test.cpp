@@ -86,6 +86,7 @@ TEST(Simulation, AzimuthRisesAnticlockwiseInEachRing) {
     const double angle = std::atan2(scan.points_lidar[i].y(), scan.points_lidar[i].x());
     return angle < -1e-6 ? angle + 2.0 * std::numbers::pi : angle;
   };
+  ASSERT_GT(scan.size(), 1000U);
   for (std::size_t i = 1; i < scan.size(); ++i) {
     if (scan.ring[i] == scan.ring[i - 1]) {
       EXPECT_GT(azimuth(i), azimuth(i - 1));
@@ -96,6 +97,7 @@ TEST(Simulation, AzimuthRisesAnticlockwiseInEachRing) {
 TEST(Simulation, BeamsLieOnTheirElevations) {
   const Scan scan = Simulation(small()).scan(0).scan;
   const SensorModel sensor = vlp_16();
+  ASSERT_GT(scan.size(), 1000U);
   for (std::size_t i = 0; i < scan.size(); ++i) {
     const Eigen::Vector3f& p = scan.points_lidar[i];
     EXPECT_NEAR(std::atan2(p.z(), p.head<2>().norm()), sensor.beam_elevation(scan.ring[i]), 1e-4);
