@@ -22,17 +22,16 @@ struct RecordingArguments {
 /// Adds --topic-in, --label-kind and --clouds-per-turn.
 void add_recording_options(CommandHandle command, RecordingArguments& recording);
 
-/// A dataset or bag, as dds::open_sequence(), with clouds that are parts of turns joined; says on
+/// A dataset or bag, as dds::open_recording(), with clouds that are parts of turns joined; says on
 /// standard error what of it cannot be read, and how it was understood (ScanDataset::remarks()).
 /// Throws DatasetError.
 [[nodiscard]] ScanDataset open_recording(const std::string& path, const std::string& topic);
 
-/// The same, with labels of the kind that the command line says, else of `input.label_kind` in
-/// `config_file`, where there is one, clouds joined to turns likewise, and fields by the names of
-/// `input.fields` there; says how many labels are of no known id. Of other axes nothing is said
-/// where the command line
-/// (`is_mount_given`) or the file tells how the lidar hangs. Throws ConfigError, too, and
-/// DatasetError where `is_strict` and a part of a bag is missing, damaged, or left out.
+/// The same by what the command line says, else by `input` in `config_file`, where there is one:
+/// the kind of labels, clouds joined to turns, names of fields. Says how many labels are of no
+/// known id; of other axes nothing where the command line (`is_mount_given`) or the file tells how
+/// the lidar hangs. Throws ConfigError, too, and DatasetError where `is_strict` and a part of a bag
+/// is missing, damaged, or left out.
 [[nodiscard]] dds::Recording open_recording(const std::string& path,
                                             const RecordingArguments& recording,
                                             const std::string& config_file = {},

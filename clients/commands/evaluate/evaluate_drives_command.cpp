@@ -170,6 +170,20 @@ std::shared_ptr<SharedLabels> labels_of(const GroundTruthSequence& sequence,
   return std::make_shared<SharedLabels>(open_segmenter(labels, sensor));
 }
 
+/// A line of --each: what became of a scan.
+void print_scan(std::size_t scan, const DriveRun& run, const OdometryResult* found) {
+  std::cerr << scan << " " << run.weighting() << " "
+            << (found != nullptr ? name(found->health) : "rejected");
+  if (found != nullptr)
+    std::cerr << " " << run.last_error() << "; it " << found->iterations << " e "
+              << found->edge_correspondences << " p " << found->plane_correspondences << " rms "
+              << found->rms_residual_m << " fit " << found->fit << " upright " << found->upright_fit
+              << " overlap " << found->overlap << " points off by "
+              << found->point_deviation_m.transpose() << " m, sigma "
+              << std::sqrt(found->covariance.diagonal().head<2>().maxCoeff()) << " m";
+  std::cerr << "\n";
+}
+
 /// All weightings on the same scans. `scan_done(seen)` returning false ends it early.
 std::vector<DriveResult> run_drive(const MutatedDrive& drive,
                                    const EvaluateDrivesArguments& arguments,
@@ -194,17 +208,7 @@ std::vector<DriveResult> run_drive(const MutatedDrive& drive,
       // In turn: the first one of a scan finds the caches cold.
       DriveRun& run = runs[(seen + k) % runs.size()];
       const OdometryResult* found = run.map(scan, drive.truth(mutated, later_s));
-      if (!arguments.each) continue;
-      std::cerr << seen << " " << run.weighting() << " "
-                << (found != nullptr ? name(found->health) : "rejected");
-      if (found != nullptr)
-        std::cerr << " " << run.last_error() << "; it " << found->iterations << " e "
-                  << found->edge_correspondences << " p " << found->plane_correspondences << " rms "
-                  << found->rms_residual_m << " fit " << found->fit << " upright "
-                  << found->upright_fit << " overlap " << found->overlap << " points off by "
-                  << found->point_deviation_m.transpose() << " m, sigma "
-                  << std::sqrt(found->covariance.diagonal().head<2>().maxCoeff()) << " m";
-      std::cerr << "\n";
+      if (arguments.each) print_scan(seen, run, found);
     }
     if (!scan_done(++seen)) break;
   }

@@ -297,14 +297,39 @@ std::optional<FrameTransform> mount_of(const ReplayArguments& arguments) {
   return FrameTransform{arguments.base_frame, arguments.frame, *T_base_lidar};
 }
 
-ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
-  const ScanDataset dataset =
+/// Says what of the recording is not as it seems. Throws what its parts throw, and
+/// std::invalid_argument for a range that has no scan.
+ScanDataset open_dataset(const ReplayArguments& arguments) {
+  ScanDataset dataset =
       open_recording(arguments.dataset, arguments.recording, {}, arguments.replay.range.strict,
                      !arguments.mount.xyz_rpy.empty())
           .dataset;
   if (arguments.replay.with_labels) warn_of_label_kind(dataset);
   (void)arguments.replay.range.end(dataset);
   if (dataset.kitti_lidar()) std::cerr << "stillmap: " << dataset.kitti_lidar()->in_words() << "\n";
+  return dataset;
+}
+
+/// Waits until the server has done with the scans that were published, and the poses of those that
+/// it mapped are there.
+void await_server(Client& client, const dds::ServerStatus& before, const ReplayArguments& arguments,
+                  ReplayPoses& poses, StopSignal& stop, ReplayOutcome& outcome) {
+  const std::vector<std::int64_t>& stamps_ns = outcome.replay.published_stamps_ns;
+  outcome.server_takes_topic = before.points_topic == arguments.topic;
+  const Patience patience =
+      patience_of(replay_options(arguments), arguments.lossless, outcome.server_takes_topic);
+  const dds::ServerStatus after =
+      wait_until_mapped(client, before, stamps_ns.size(), patience, stop);
+  outcome.server = counts_since(before, after);
+  if (outcome.server->is_restarted)
+    std::cerr << "stillmap: the server was restarted during the replay: what it counted before is "
+                 "lost\n";
+  if (outcome.server->mapped == stamps_ns.size())
+    poses.wait_for(stamps_ns, arguments.client.timeout());
+}
+
+ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
+  const ScanDataset dataset = open_dataset(arguments);
   SensorFeeds feeds{SampleFeed(dataset.imu()), SampleFeed(dataset.gnss())};
   const bool has_imu = !feeds.imu.empty();
   Client client = connect(arguments.client);
@@ -329,23 +354,8 @@ ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
   poses.begin();
   ReplayOutcome outcome;
   outcome.replay = publish_with_progress(dataset, std::move(feeds), arguments, publisher, stop);
-  const std::vector<std::int64_t>& stamps_ns = outcome.replay.published_stamps_ns;
-  outcome.poses = poses.poses_of(stamps_ns);
-  outcome.frame = poses.frame();
-  if (stop.requested()) return outcome;
-  outcome.server_takes_topic = before.points_topic == arguments.topic;
-  const Patience patience =
-      patience_of(replay_options(arguments), arguments.lossless, outcome.server_takes_topic);
-  const dds::ServerStatus after =
-      wait_until_mapped(client, before, stamps_ns.size(), patience, stop);
-  outcome.server = counts_since(before, after);
-  if (outcome.server->is_restarted)
-    std::cerr << "stillmap: the server was restarted during the replay: what it counted before is "
-                 "lost\n";
-  if (outcome.server->mapped == stamps_ns.size()) {
-    poses.wait_for(stamps_ns, arguments.client.timeout());
-  }
-  outcome.poses = poses.poses_of(stamps_ns);
+  if (!stop.requested()) await_server(client, before, arguments, poses, stop, outcome);
+  outcome.poses = poses.poses_of(outcome.replay.published_stamps_ns);
   outcome.frame = poses.frame();
   return outcome;
 }

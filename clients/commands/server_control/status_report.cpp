@@ -55,13 +55,11 @@ Json to_json(const dds::SegmentationStatus& segmentation) {
           {"unlabelled_share", segmentation.unlabelled_share}};
 }
 
-}  // namespace
-
-Json status_json(const dds::ServerStatus& status) {
-  // Those of one name are an object by what they are of: {"scans_dropped": {"queue_full": 3}}.
+/// Those of one name are an object by what they are of: {"scans_dropped": {"queue_full": 3}}.
+Json to_json(const std::vector<dds::NamedCounter>& all) {
   std::map<std::string, std::map<std::string, std::uint64_t>> detailed;
   Json counters = Json::object();
-  for (const dds::NamedCounter& counter : status.counters) {
+  for (const dds::NamedCounter& counter : all) {
     if (counter.detail.empty()) {
       counters.set(counter.name, counter.value);
     } else {
@@ -69,21 +67,35 @@ Json status_json(const dds::ServerStatus& status) {
     }
   }
   for (const auto& [name, values] : detailed) counters.set(name, values);
+  return counters;
+}
+
+Json to_json(const std::vector<dds::StageLatency>& stages) {
   Json latencies = Json::object();
-  for (const dds::StageLatency& stage : status.latencies) {
+  for (const dds::StageLatency& stage : stages) {
     latencies.set(stage.stage, {{"p50_ms", stage.p50_ms},
                                 {"p99_ms", stage.p99_ms},
                                 {"max_ms", stage.max_ms},
                                 {"samples", stage.samples}});
   }
+  return latencies;
+}
+
+Json to_json(const std::vector<dds::Diagnostic>& all) {
   Json diagnostics = Json::array();
-  for (const dds::Diagnostic& diagnostic : status.diagnostics) {
+  for (const dds::Diagnostic& diagnostic : all) {
     diagnostics.push_back(
         {{"severity", diagnostic.severity == dds::Severity::problem ? "problem" : "advice"},
          {"what", diagnostic.what},
          {"evidence", diagnostic.evidence},
          {"hint", diagnostic.hint}});
   }
+  return diagnostics;
+}
+
+}  // namespace
+
+Json status_json(const dds::ServerStatus& status) {
   return {{"stamp_ns", status.stamp_ns},
           {"software_version", status.software_version},
           {"uptime_s", status.uptime_s},
@@ -99,14 +111,14 @@ Json status_json(const dds::ServerStatus& status) {
           {"tiles", status.tile_count},
           {"voxels", status.voxel_count},
           {"dropped", status.dropped()},
-          {"counters", counters},
-          {"latencies", latencies},
+          {"counters", to_json(status.counters)},
+          {"latencies", to_json(status.latencies)},
           {"host", status.host},
           {"sensor", status.sensor},
           {"points_topic", status.points_topic},
           {"scan_frame", status.scan_frame},
           {"scan_delay_s", status.scan_delay_s},
-          {"diagnostics", diagnostics}};
+          {"diagnostics", to_json(status.diagnostics)}};
 }
 
 }  // namespace stillmap::cli
