@@ -187,6 +187,41 @@ bool can_stand(const TraversabilityView& view, CellLookup& lookup,
   return false;
 }
 
+/// Free cells at which a search for a place to stand ends: some tenths of a second.
+constexpr std::size_t max_tried = 20'000;
+
+/// What came of a search for a place to stand.
+struct StandingSearch {
+  std::optional<Candidate> nearest;
+  /// It ended at `max_tried` cells.
+  bool is_cut_short = false;
+};
+
+StandingSearch search_nearest(const TraversabilityView& view, CellLookup& lookup,
+                              const Eigen::Vector2d& position_map, double max_distance_m) {
+  // Tiles by their distance: none behind a place that was found has a nearer one.
+  std::vector<std::pair<double, const TraversabilityTile*>> tiles;
+  for (const auto& tile : view.tiles)
+    tiles.emplace_back(distance_to(view, *tile, position_map), tile.get());
+  std::ranges::sort(tiles, {}, &std::pair<double, const TraversabilityTile*>::first);
+  StandingSearch search;
+  std::size_t tried = 0;
+  double below_m = std::nextafter(max_distance_m, HUGE_VAL);
+  for (const auto& [tile_m, tile] : tiles) {
+    if (tile_m >= below_m || tried >= max_tried) break;
+    for (const Candidate& candidate : candidates_in(view, *tile, position_map, below_m)) {
+      if (tried >= max_tried) break;
+      ++tried;
+      if (!can_stand(view, lookup, view.centre_of(candidate.cell))) continue;
+      search.nearest = candidate;
+      below_m = candidate.distance_m;
+      break;
+    }
+  }
+  search.is_cut_short = tried >= max_tried;
+  return search;
+}
+
 }  // namespace
 
 std::string_view name(CellState state) {
@@ -312,55 +347,35 @@ std::string_view name(TraversabilityStatus status) {
 NearestTraversable nearest_traversable(const TraversabilityView& view,
                                        const Eigen::Vector2d& position_map, double max_distance_m) {
   if (view.tiles.empty()) return refused(TraversabilityStatus::not_found, "the map is empty");
+  std::ostringstream place;
+  place << "(" << position_map.x() << ", " << position_map.y() << ")";
   std::ostringstream text;
   if (!view.cell_of(position_map)) {
-    text << "position (" << position_map.x() << ", " << position_map.y()
-         << "); must be finite and within 100 km of the map's origin";
+    text << "position " << place.str() << "; must be finite and within 100 km of the map's origin";
     return refused(TraversabilityStatus::invalid_request, text.str());
   }
   if (!(max_distance_m > 0.0)) {
     text << "max_distance_m = " << max_distance_m << "; must be above 0";
     return refused(TraversabilityStatus::invalid_request, text.str());
   }
-  // Tiles by their distance: none behind a place that was found has a nearer one.
-  std::vector<std::pair<double, const TraversabilityTile*>> tiles;
-  for (const auto& tile : view.tiles)
-    tiles.emplace_back(distance_to(view, *tile, position_map), tile.get());
-  std::ranges::sort(tiles, {}, &std::pair<double, const TraversabilityTile*>::first);
-  // Some tenths of a second.
-  constexpr std::size_t max_tried = 20'000;
-  std::size_t tried = 0;
   CellLookup lookup(view);
-  std::optional<Candidate> best;
-  double below_m = std::nextafter(max_distance_m, HUGE_VAL);
-  for (const auto& [tile_m, tile] : tiles) {
-    if (tile_m >= below_m || tried >= max_tried) break;
-    for (const Candidate& candidate : candidates_in(view, *tile, position_map, below_m)) {
-      if (tried >= max_tried) break;
-      ++tried;
-      if (!can_stand(view, lookup, view.centre_of(candidate.cell))) continue;
-      best = candidate;
-      below_m = candidate.distance_m;
-      break;
-    }
-  }
-  if (best) {
-    const CellLookup::Found found = lookup.at(best->cell);
-    return {.reason = {},
-            .position_map = view.centre_of(best->cell),
-            .height_m = found.surface->ground.height_m,
-            .distance_m = best->distance_m,
-            .cell = found.cell,
-            .map_version = view.version};
-  }
-  if (tried >= max_tried) {
-    text << "none of the " << max_tried << " free cells nearest to (" << position_map.x() << ", "
-         << position_map.y() << ") has room for '" << view.profile.name << "'";
+  const StandingSearch search = search_nearest(view, lookup, position_map, max_distance_m);
+  if (!search.nearest) {
+    if (search.is_cut_short)
+      text << "none of the " << max_tried << " free cells nearest to " << place.str()
+           << " has room for '" << view.profile.name << "'";
+    else
+      text << "no place for '" << view.profile.name << "' within " << max_distance_m << " m of "
+           << place.str();
     return refused(TraversabilityStatus::not_found, text.str());
   }
-  text << "no place for '" << view.profile.name << "' within " << max_distance_m << " m of ("
-       << position_map.x() << ", " << position_map.y() << ")";
-  return refused(TraversabilityStatus::not_found, text.str());
+  const CellLookup::Found found = lookup.at(search.nearest->cell);
+  return {.reason = {},
+          .position_map = view.centre_of(search.nearest->cell),
+          .height_m = found.surface->ground.height_m,
+          .distance_m = search.nearest->distance_m,
+          .cell = found.cell,
+          .map_version = view.version};
 }
 
 }  // namespace stillmap
