@@ -239,6 +239,56 @@ Map open_map(const std::filesystem::path& file) {
           .read_evidence = std::move(read_evidence)};
 }
 
+void bind_description(py::class_<Map>& bound) {
+  bound.def_property_readonly("version", [](const Map& map) { return map.view->version; })
+      .def_property_readonly("map_id", [](const Map& map) { return map.view->map_id; })
+      .def_property_readonly("voxel_size_m", [](const Map& map) { return map.view->voxel_size_m; })
+      .def_property_readonly("tile_size_m", [](const Map& map) { return map.view->tile_size_m; })
+      .def_property_readonly(
+          "trajectory", [](const Map& map) { return trajectory_of(map.trajectory); },
+          "The path; empty where it is not known.")
+      .def_readonly("metadata", &Map::metadata, "Free text by key, as \"sensor\".")
+      .def_property_readonly(
+          "tiles",
+          [](const Map& map) {
+            std::vector<TileOfMap> tiles;
+            for (const auto& tile : map.view->tiles) tiles.push_back({tile});
+            return tiles;
+          },
+          "List of Tile, sorted by id.")
+      .def("__len__", [](const Map& map) { return map.view->tiles.voxel_count(); });
+}
+
+/// What a map is asked for.
+void bind_questions(py::class_<Map>& bound) {
+  bound
+      .def(
+          "voxels", [](const Map& map) { return voxels_of(tiles_of(*map.view)); },
+          "All voxels as arrays, in the order of the tiles.")
+      .def(
+          "evidence", [](const Map& map) { return votes_of(tiles_of(*map.view)); },
+          "(labels (n, 3) uint8, weights (n, 3) float32): votes for the strongest classes of every "
+          "voxel, in the order of voxels(); a weight of 0 is no vote. Maps of a server have the "
+          "winner alone.")
+      .def("removed", &removed_of,
+           "What is kept out of the map, and why: position_map (n, 3) float32 [m], label (n,), "
+           "reason (n,) text, last_seen_ns (n,). Empty for a map of a server; ask the client. Of a "
+           "map file, it is read when it is asked for: raises MapFileError if the file was changed "
+           "since.")
+      .def("query", &query, py::arg("region"), py::arg("classes") = std::vector<std::string>{},
+           py::arg("resolution_m") = 0.0,
+           "Voxels of a region. classes: names, none are all. resolution_m: 0 is the map's own. "
+           "Raises ValueError for a region that cannot be used.")
+      .def(
+          "traversability",
+          [](const Map& map, const std::string& robot) {
+            const py::gil_scoped_release released;
+            return traversability_of(*map.view, robot);
+          },
+          py::arg("robot") = "car",
+          "Where a robot (car, delivery_robot, tracked, or a file) can go. Raises ConfigError.");
+}
+
 }  // namespace
 
 std::bitset<semantic_class_count> classes_from(const std::vector<std::string>& names) {
@@ -279,49 +329,9 @@ void bind_map(py::module_& module) {
   bind_voxels(module);
   bind_tile(module);
   bind_answers(module);
-  py::class_<Map>(module, "Map", "A state of the static map, which does not change.")
-      .def_property_readonly("version", [](const Map& map) { return map.view->version; })
-      .def_property_readonly("map_id", [](const Map& map) { return map.view->map_id; })
-      .def_property_readonly("voxel_size_m", [](const Map& map) { return map.view->voxel_size_m; })
-      .def_property_readonly("tile_size_m", [](const Map& map) { return map.view->tile_size_m; })
-      .def_property_readonly(
-          "trajectory", [](const Map& map) { return trajectory_of(map.trajectory); },
-          "The path; empty where it is not known.")
-      .def_readonly("metadata", &Map::metadata, "Free text by key, as \"sensor\".")
-      .def_property_readonly(
-          "tiles",
-          [](const Map& map) {
-            std::vector<TileOfMap> tiles;
-            for (const auto& tile : map.view->tiles) tiles.push_back({tile});
-            return tiles;
-          },
-          "List of Tile, sorted by id.")
-      .def("__len__", [](const Map& map) { return map.view->tiles.voxel_count(); })
-      .def(
-          "voxels", [](const Map& map) { return voxels_of(tiles_of(*map.view)); },
-          "All voxels as arrays, in the order of the tiles.")
-      .def(
-          "evidence", [](const Map& map) { return votes_of(tiles_of(*map.view)); },
-          "(labels (n, 3) uint8, weights (n, 3) float32): votes for the strongest classes of every "
-          "voxel, in the order of voxels(); a weight of 0 is no vote. Maps of a server have the "
-          "winner alone.")
-      .def("removed", &removed_of,
-           "What is kept out of the map, and why: position_map (n, 3) float32 [m], label (n,), "
-           "reason (n,) text, last_seen_ns (n,). Empty for a map of a server; ask the client. Of a "
-           "map file, it is read when it is asked for: raises MapFileError if the file was changed "
-           "since.")
-      .def("query", &query, py::arg("region"), py::arg("classes") = std::vector<std::string>{},
-           py::arg("resolution_m") = 0.0,
-           "Voxels of a region. classes: names, none are all. resolution_m: 0 is the map's own. "
-           "Raises ValueError for a region that cannot be used.")
-      .def(
-          "traversability",
-          [](const Map& map, const std::string& robot) {
-            const py::gil_scoped_release released;
-            return traversability_of(*map.view, robot);
-          },
-          py::arg("robot") = "car",
-          "Where a robot (car, delivery_robot, tracked, or a file) can go. Raises ConfigError.");
+  py::class_<Map> map(module, "Map", "A state of the static map, which does not change.");
+  bind_description(map);
+  bind_questions(map);
   module.def(
       "open_map",
       [](const std::filesystem::path& file) {

@@ -199,15 +199,9 @@ void bind_mapped_scan(py::module_& module) {
       .def("__len__", [](const MappedScan& s) { return s.labelled.scan.size(); });
 }
 
-}  // namespace
-
-void bind_mapper(py::module_& module) {
-  module.attr("MOTIONS") = py::make_tuple("stationary", "semi_static", "highly_dynamic");
-  bind_mapped_scan(module);
-  py::class_<SharedMapper>(
-      module, "Mapper",
-      "The server's pipeline in this process: poses, classes and a static map of scans, one after "
-      "the other. Threads that share it wait for each other.")
+/// What a mapper is given.
+void bind_inputs(py::class_<SharedMapper>& mapper) {
+  mapper
       .def(py::init(&make_mapper), py::arg("sensor"), py::arg("labels") = "none",
            py::arg("config") = py::none(),
            "sensor: a Sensor. labels: \"none\" (pure geometry), \"scan\" (those of the scans), "
@@ -233,7 +227,12 @@ void bind_mapper(py::module_& module) {
       .def(
           "reset", [](SharedMapper& shared) { shared.reset(); },
           "Begins a new map at the next scan, whose pose is its origin; the lidar goes on as it "
-          "moved.")
+          "moved.");
+}
+
+/// What it has made of that.
+void bind_results(py::class_<SharedMapper>& mapper) {
+  mapper
       .def_property_readonly(
           "trajectory",
           [](SharedMapper& shared) {
@@ -257,6 +256,19 @@ void bind_mapper(py::module_& module) {
           py::arg("file"),
           "Writes a new map file, which servers resume and open_map() reads. Raises "
           "MapFileError.");
+}
+
+}  // namespace
+
+void bind_mapper(py::module_& module) {
+  module.attr("MOTIONS") = py::make_tuple("stationary", "semi_static", "highly_dynamic");
+  bind_mapped_scan(module);
+  py::class_<SharedMapper> mapper(
+      module, "Mapper",
+      "The server's pipeline in this process: poses, classes and a static map of scans, one after "
+      "the other. Threads that share it wait for each other.");
+  bind_inputs(mapper);
+  bind_results(mapper);
 }
 
 }  // namespace stillmap::python
