@@ -7,6 +7,7 @@
 
 #include "core/map/storage/map_file.hpp"
 #include "tests/clients/command_test.hpp"
+#include "tests/clients/unusable_maps.hpp"
 
 namespace stillmap::test {
 namespace {
@@ -62,8 +63,7 @@ TEST_F(MergeCommandTest, PutsOneMapIntoTheOtherAndCanWithdrawIt) {
 }
 
 TEST_F(MergeCommandTest, NamesWhatItCannotMerge) {
-  write("text.stillmap", "no map at all");
-  open_map_file(folder_ / "empty.stillmap")->save(SavedMap{});
+  write_unusable_maps(folder_);
   SavedMap pathless = open_map_file(map("b"))->load();
   pathless.trajectory = {};
   open_map_file(folder_ / "pathless.stillmap")->save(pathless);
@@ -78,15 +78,6 @@ TEST_F(MergeCommandTest, NamesWhatItCannotMerge) {
   const Trajectory whole = later.trajectory.to_vector();
   later.trajectory = Trajectory(whole.begin() + 5, whole.end());
   open_map_file(folder_ / "later.stillmap")->save(later);
-  StaticMapConfig coarse;
-  coarse.voxel_size_m = 0.4;
-  StaticMap coarse_map(coarse);
-  LabelledScan scan;
-  scan.scan.points_lidar.emplace_back(1.0F, 2.0F, 3.0F);
-  scan.motion.push_back(Motion::stationary);
-  coarse_map.insert(scan, Eigen::Isometry3d::Identity());
-  open_map_file(folder_ / "coarse.stillmap")
-      ->save(to_saved_map(coarse_map.checkpoint(CheckpointScope::everything)));
   write("there.stillmap", "something");
   for (const auto& [arguments, fault] : {
            std::pair{map("a") + " " + path("none.stillmap"), std::string("none.stillmap")},

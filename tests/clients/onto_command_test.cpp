@@ -9,6 +9,7 @@
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/simulation/simulation.hpp"
 #include "tests/clients/command_test.hpp"
+#include "tests/clients/unusable_maps.hpp"
 
 namespace stillmap::test {
 namespace {
@@ -214,18 +215,7 @@ TEST_F(OntoCommandTest, AnotherYardIsNotRecognised) {
 TEST_F(OntoCommandTest, NamesWhatCannotBeGoneOnIn) {
   simulate("yard", 6);
   ASSERT_NO_FATAL_FAILURE(succeed("map " + path("yard") + " --out " + path("one")));
-  write("text.stillmap", "no map at all");
-  open_map_file(folder_ / "empty.stillmap")->save(SavedMap{});
-  StaticMapConfig config;
-  config.voxel_size_m = 0.4;
-  config.tile_size_m = 40.0;
-  StaticMap coarse_map(config);
-  LabelledScan scan;
-  scan.scan.points_lidar.emplace_back(1.0F, 2.0F, 3.0F);
-  scan.motion.push_back(Motion::stationary);
-  coarse_map.insert(scan, Eigen::Isometry3d::Identity());
-  open_map_file(folder_ / "coarse.stillmap")
-      ->save(to_saved_map(coarse_map.checkpoint(CheckpointScope::everything)));
+  write_unusable_maps(folder_);
   const std::string one = path("one/map.stillmap");
   for (const auto& [options, fault] :
        {std::pair<std::string, std::string>{path("none.stillmap"), "none.stillmap"},
