@@ -37,6 +37,12 @@ std::vector<LabelledPoint> points_seen_until(const MapSnapshot& view, TileReader
   return points;
 }
 
+/// Null where there is none.
+template <typename T>
+T* pointer_to(std::optional<T>& part) {
+  return part ? &*part : nullptr;
+}
+
 }  // namespace
 
 Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter,
@@ -46,6 +52,18 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
       scans_(config.input.queue_length),
       poses_(context.participant, context.topics, config.frames),
       place_finder_(config, storage_.latest_map(), storage_.tiles(), context.statistics) {
+  open_topics(config, context);
+  open_loops(config, context);
+  if (!config.automatic_sensor.is_on) context.statistics.set_sensor(config.mapper.sensor.name);
+  thread_.emplace(config, std::move(segmenter), storage_.take_loaded(),
+                  storage_.saver().tile_store(), scans_, context.statistics, storage_.latest_map(),
+                  outputs(std::move(open_segmenter), context));
+  storage_.saver().set_source(*thread_);
+  checkpoints_.emplace(std::chrono::duration<double>(config.map.save_period_s),
+                       [this] { storage_.saver().save_if_changed(); });
+}
+
+void Mapping::open_topics(const ServerConfig& config, const MappingContext& context) {
   if (config.publish.scan) labelled_scans_.emplace(context.participant, context.topics);
   if (!config.topics.odometry_prior.empty()) {
     prior_.emplace(context.participant, config.topics.odometry_prior, context.statistics);
@@ -59,42 +77,39 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
     initial_pose_.emplace(context.participant, config.topics.initial_pose, config.frames.map,
                           place_finder_, context.statistics);
   }
-  if (config.map.close_loops) {
-    loops_.emplace(
-        live_loops(config), config.input.delivery == DeliveryMode::every, context.statistics,
-        [this](std::int64_t stamp_ns, const Eigen::Vector2d& position_map, double radius_m) {
-          return points_seen_until(*storage_.latest_map().view(), storage_.tiles(), stamp_ns,
-                                   position_map, radius_m);
-        },
-        config.gnss.antenna_base.value_or(Eigen::Vector3d::Zero()));
-    submaps_.emplace(context.participant, context.topics);
-  }
-  if (loops_ && !config.topics.gnss.empty()) {
+}
+
+void Mapping::open_loops(const ServerConfig& config, const MappingContext& context) {
+  if (!config.map.close_loops) return;
+  loops_.emplace(
+      live_loops(config), config.input.delivery == DeliveryMode::every, context.statistics,
+      [this](std::int64_t stamp_ns, const Eigen::Vector2d& position_map, double radius_m) {
+        return points_seen_until(*storage_.latest_map().view(), storage_.tiles(), stamp_ns,
+                                 position_map, radius_m);
+      },
+      config.gnss.antenna_base.value_or(Eigen::Vector3d::Zero()));
+  submaps_.emplace(context.participant, context.topics);
+  if (!config.topics.gnss.empty()) {
     gnss_.emplace(context.participant, config.topics.gnss, config.input.delivery, *loops_,
                   context.statistics);
     earth_.emplace(context.participant, context.topics, config.frames.map);
   }
-  const MappingOutputs outputs{
-      .poses = &poses_,
-      .scans = labelled_scans_ ? &*labelled_scans_ : nullptr,
-      .prior = prior_ ? &*prior_ : nullptr,
-      .static_transforms = static_transforms_ ? &*static_transforms_ : nullptr,
-      .imu = imu_ ? &*imu_ : nullptr,
-      .occupancy = context.occupancy,
-      .place_finder = &place_finder_,
-      .loops = loops_ ? &*loops_ : nullptr,
-      .tiles = &storage_.tiles(),
-      .earth = earth_ ? &*earth_ : nullptr,
-      .submaps = submaps_ ? &*submaps_ : nullptr,
-      .throttle = &context.throttle,
-      .open_segmenter = std::move(open_segmenter)};
-  if (!config.automatic_sensor.is_on) context.statistics.set_sensor(config.mapper.sensor.name);
-  thread_.emplace(config, std::move(segmenter), storage_.take_loaded(),
-                  storage_.saver().tile_store(), scans_, context.statistics, storage_.latest_map(),
-                  outputs);
-  storage_.saver().set_source(*thread_);
-  checkpoints_.emplace(std::chrono::duration<double>(config.map.save_period_s),
-                       [this] { storage_.saver().save_if_changed(); });
+}
+
+MappingOutputs Mapping::outputs(OpenSegmenter open_segmenter, const MappingContext& context) {
+  return {.poses = &poses_,
+          .scans = pointer_to(labelled_scans_),
+          .prior = pointer_to(prior_),
+          .static_transforms = pointer_to(static_transforms_),
+          .imu = pointer_to(imu_),
+          .occupancy = context.occupancy,
+          .place_finder = &place_finder_,
+          .loops = pointer_to(loops_),
+          .tiles = &storage_.tiles(),
+          .earth = pointer_to(earth_),
+          .submaps = pointer_to(submaps_),
+          .throttle = &context.throttle,
+          .open_segmenter = std::move(open_segmenter)};
 }
 
 void Mapping::stop() {

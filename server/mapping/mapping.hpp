@@ -72,6 +72,12 @@ class Mapping {
                                               const std::shared_ptr<TileStore>& tile_store);
 
  private:
+  /// Receivers and publishers of the topics that the configuration names.
+  void open_topics(const ServerConfig& config, const MappingContext& context);
+  /// Loops, and what a satellite receiver tells of them.
+  void open_loops(const ServerConfig& config, const MappingContext& context);
+  [[nodiscard]] MappingOutputs outputs(OpenSegmenter open_segmenter, const MappingContext& context);
+
   std::string label_source_;
   MapStorage& storage_;
   ScanQueue scans_;
