@@ -47,14 +47,67 @@ bool lies_on_level_plane(const FittedSurface& surface) {
   return surface.normal_count == 1 && std::abs(surface.normals[0].z()) > min_cosine;
 }
 
+/// Counts how well a feature fits, whatever its weight.
+void count_fit(const FittedSurface& surface, double squared_m2, NormalEquations& equations) {
+  const double score = geman_mcclure(fit_scale_m, squared_m2);
+  const bool is_level = lies_on_level_plane(surface);
+  equations.scores += score;
+  equations.on_level_planes += is_level ? 1 : 0;
+  equations.upright_scores += is_level ? 0.0 : score;
+}
+
+/// Adds the weight of a feature and its arm from the lidar.
+void add_arm(double w, const Correspondence& c, std::size_t residuals,
+             const Eigen::Isometry3d& T_map_lidar, NormalEquations& equations) {
+  const auto& weights = c.surface.weights;
+  const double w_surface = w * *std::max_element(weights.begin(), weights.begin() + residuals);
+  const Eigen::Vector3d arm_map = T_map_lidar.linear() * c.point_lidar;
+  equations.weights += w_surface;
+  equations.arms += w_surface * (arm_map.squaredNorm() * Eigen::Matrix3d::Identity() -
+                                 arm_map * arm_map.transpose());
+}
+
+/// Sums of a sweep that rolls: over the motion within it, and over that with the pose.
+class SweepSums {
+ public:
+  using Slope = InformationSum::Slope;
+
+  /// A residual of weight w at this part of the sweep, which pulls along its slope.
+  void add(double part, double w, double pull, const Slope& slope) {
+    pose_twist_.add(part * w, slope);
+    twist_.add(part * part * w, slope);
+    gradient_.head<6>() += part * pull * slope.head<6>();
+    const double bend_slope = part * part * slope[5];
+    pose_bend_ += w * bend_slope * slope;
+    twist_bend_ += part * w * bend_slope * slope;
+    bend_ += w * bend_slope * bend_slope;
+    gradient_[bend_of_sweep] += pull * bend_slope;
+  }
+  void write_to(NormalEquations& equations) const {
+    equations.gradient_sweep = gradient_;
+    equations.hessian_pose_sweep << pose_twist_.matrix(), pose_bend_.head<6>();
+    equations.hessian_sweep.topLeftCorner<6, 6>() = twist_.matrix();
+    equations.hessian_sweep.block<6, 1>(0, bend_of_sweep) = twist_bend_.head<6>();
+    equations.hessian_sweep.block<1, 6>(bend_of_sweep, 0) = twist_bend_.head<6>().transpose();
+    equations.hessian_sweep(bend_of_sweep, bend_of_sweep) = bend_;
+  }
+
+ private:
+  InformationSum pose_twist_, twist_;
+  Slope pose_bend_ = Slope::Zero();
+  Slope twist_bend_ = Slope::Zero();
+  double bend_ = 0.0;
+  SweepTangent gradient_ = SweepTangent::Zero();
+};
+
 NormalEquations build_normal_equations(std::span<const Correspondence> correspondences,
                                        std::size_t edge_count, bool rolling, bool weighs_planes,
                                        const Eigen::Isometry3d& T_map_lidar,
                                        const OdometryConfig& config) {
   NormalEquations equations;
-  InformationSum hessian, hessian_pose_sweep, hessian_sweep;
+  InformationSum hessian;
+  SweepSums sweep;
   InformationSum::Slope slope = InformationSum::Slope::Zero();
-  InformationSum::Slope pose_bend = slope, twist_bend = slope;
   for (std::size_t i = 0; i < correspondences.size(); ++i) {
     const Correspondence& c = correspondences[i];
     if (!c.found) continue;
@@ -62,11 +115,7 @@ NormalEquations build_normal_equations(std::span<const Correspondence> correspon
     const double squared = r.squared_norm();
     const double distance = std::sqrt(squared);
     if (distance > config.registration.max_residual_m) continue;
-    const double score = geman_mcclure(fit_scale_m, squared);
-    equations.scores += score;
-    const bool is_level = lies_on_level_plane(c.surface);
-    equations.on_level_planes += is_level ? 1 : 0;
-    equations.upright_scores += is_level ? 0.0 : score;
+    count_fit(c.surface, squared, equations);
     const double w = weight(config.weighting, config.alpha, distance, c.inconsistency) *
                      geman_mcclure(config.registration.robust_scale_m, squared) *
                      (weighs_planes ? c.thinness : 1.0);
@@ -79,29 +128,13 @@ NormalEquations build_normal_equations(std::span<const Correspondence> correspon
       hessian.add(w_k, slope);
       equations.gradient += pull * r.slopes[k];
       equations.weighted_squares += pull * r.distances[k];
-      if (!rolling) continue;
-      hessian_pose_sweep.add(c.sweep_part * w_k, slope);
-      hessian_sweep.add(c.sweep_part * c.sweep_part * w_k, slope);
-      equations.gradient_sweep.head<6>() += c.sweep_part * pull * r.slopes[k];
-      const double bend_slope = c.sweep_part * c.sweep_part * slope[5];
-      pose_bend += w_k * bend_slope * slope;
-      twist_bend += c.sweep_part * w_k * bend_slope * slope;
-      equations.hessian_sweep(bend_of_sweep, bend_of_sweep) += w_k * bend_slope * bend_slope;
-      equations.gradient_sweep[bend_of_sweep] += pull * bend_slope;
+      if (rolling) sweep.add(c.sweep_part, w_k, pull, slope);
     }
-    const double w_surface =
-        w * *std::max_element(c.surface.weights.begin(), c.surface.weights.begin() + r.count);
-    const Eigen::Vector3d arm_map = T_map_lidar.linear() * c.point_lidar;
-    equations.weights += w_surface;
-    equations.arms += w_surface * (arm_map.squaredNorm() * Eigen::Matrix3d::Identity() -
-                                   arm_map * arm_map.transpose());
+    add_arm(w, c, r.count, T_map_lidar, equations);
     (i < edge_count ? equations.edges : equations.planes) += 1;
   }
   equations.hessian = hessian.matrix();
-  equations.hessian_pose_sweep << hessian_pose_sweep.matrix(), pose_bend.head<6>();
-  equations.hessian_sweep.topLeftCorner<6, 6>() = hessian_sweep.matrix();
-  equations.hessian_sweep.block<6, 1>(0, bend_of_sweep) = twist_bend.head<6>();
-  equations.hessian_sweep.block<1, 6>(bend_of_sweep, 0) = twist_bend.head<6>().transpose();
+  sweep.write_to(equations);
   return equations;
 }
 
