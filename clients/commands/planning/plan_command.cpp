@@ -63,10 +63,13 @@ Goal place_of(const std::string& option, const std::vector<std::string>& words) 
   return place;
 }
 
+/// Throws std::invalid_argument for a name that is none.
 PlannerKind planner_of(const std::string& text) {
-  std::size_t i = 0;
-  while (name(static_cast<PlannerKind>(i)) != text) ++i;
-  return static_cast<PlannerKind>(i);
+  for (std::size_t i = 0; i < planner_kind_count; ++i) {
+    const auto kind = static_cast<PlannerKind>(i);
+    if (name(kind) == text) return kind;
+  }
+  throw std::invalid_argument("--planner " + text + ": there is no such planner");
 }
 
 std::vector<std::string> planner_names() {
@@ -91,11 +94,6 @@ PlanTask task_of(const PlanArguments& arguments) {
   const std::string faults = task.config.faults();
   if (!faults.empty()) throw std::invalid_argument(faults);
   return task;
-}
-
-/// Refuses file names that cannot be written before the search, not after it.
-void check_files(const PlanArguments& arguments) {
-  if (!arguments.output.empty()) check_plan_file(arguments.output);
 }
 
 void print(const PlanArguments& arguments, const TimedPlan& timed) {
@@ -206,7 +204,8 @@ ExitCode plan_on_server(const PlanArguments& arguments) {
 }
 
 ExitCode run(const PlanArguments& arguments) {
-  check_files(arguments);
+  // Before the search, not after it.
+  if (!arguments.output.empty()) check_plan_file(arguments.output);
   return arguments.map.empty() ? plan_on_server(arguments) : plan_on_file(arguments);
 }
 
