@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <random>
 #include <stdexcept>
 #include <utility>
+
+#include "core/lidar/angle_units.hpp"
 
 namespace stillmap::evaluation {
 namespace {
@@ -124,8 +125,7 @@ std::vector<MutatedScan> mutate_drive(DriveMutation mutation,
 Scan mutate_scan(Scan scan, const MutatedScan& mutated) {
   scan.stamp_ns = mutated.stamp_ns;
   const auto is_visible = [&mutated](const Eigen::Vector3f& point_lidar) {
-    const double azimuth_deg =
-        std::atan2(point_lidar.y(), point_lidar.x()) * 180.0 / std::numbers::pi;
+    const double azimuth_deg = std::atan2(point_lidar.y(), point_lidar.x()) * deg_per_rad;
     return azimuth_deg >= mutated.visible_from_deg && azimuth_deg <= mutated.visible_to_deg;
   };
   if (mutated.visible_from_deg <= -180.0 && mutated.visible_to_deg >= 180.0) return scan;

@@ -1,9 +1,9 @@
 #include "core/evaluation/pose_health.hpp"
 
 #include <algorithm>
-#include <numbers>
 
 #include "core/evaluation/trajectory_error.hpp"
+#include "core/lidar/angle_units.hpp"
 
 namespace stillmap::evaluation {
 namespace {
@@ -23,7 +23,7 @@ Eigen::Isometry3d motion_error(const Anchor& from, const Anchor& to) {
 bool has_left(const Anchor& last_right, const Anchor& now, const WrongPoseLimits& limits) {
   const double path_m = now.path_m - last_right.path_m;
   const Eigen::Isometry3d error = motion_error(last_right, now);
-  const double rotation_deg = rotation_angle(error) * 180.0 / std::numbers::pi;
+  const double rotation_deg = rotation_angle(error) * deg_per_rad;
   return error.translation().norm() > limits.translation_m + limits.translation_share * path_m ||
          rotation_deg > limits.rotation_deg + limits.rotation_deg_per_m * path_m;
 }

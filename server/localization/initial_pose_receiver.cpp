@@ -2,9 +2,9 @@
 
 #include <spdlog/spdlog.h>
 
-#include <numbers>
 #include <utility>
 
+#include "core/lidar/angle_units.hpp"
 #include "idl/conversions/localization.hpp"
 #include "idl/interface/topics.hpp"
 #include "server/monitoring/shown_name.hpp"
@@ -41,8 +41,7 @@ void InitialPoseReceiver::take(const PoseWithCovarianceStamped& message) {
   spdlog::info(
       "a pose was given: looking for the robot within {:.1f} m of {:.2f} {:.2f}, turned by "
       "up to {:.0f} degrees",
-      initial.guess->radius_m, p.x(), p.y(),
-      initial.guess->max_turn_rad * 180.0 / std::numbers::pi);
+      initial.guess->radius_m, p.x(), p.y(), initial.guess->max_turn_rad * deg_per_rad);
   statistics_.count("initial_poses");
   finder_.look_near(*initial.guess);
 }

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <ctime>
-#include <numbers>
 #include <sstream>
 #include <utility>
 
 #include "clients/commands/arguments/mapper_arguments.hpp"
+#include "core/lidar/angle_units.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -24,7 +24,7 @@ double process_ms() {
 std::string in_words(const Eigen::Isometry3d& motion) {
   std::ostringstream text;
   text << 100.0 * motion.translation().norm() << " cm "
-       << evaluation::rotation_angle(motion) * 180.0 / std::numbers::pi << " deg";
+       << evaluation::rotation_angle(motion) * deg_per_rad << " deg";
   return text.str();
 }
 

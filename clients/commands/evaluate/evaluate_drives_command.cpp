@@ -4,6 +4,7 @@
 #include <functional>
 #include <iostream>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <random>
 #include <stdexcept>
@@ -23,6 +24,7 @@
 #include "config/loaders/model_file.hpp"
 #include "config/loaders/server_config.hpp"
 #include "core/evaluation/drive_mutation.hpp"
+#include "core/lidar/angle_units.hpp"
 #include "core/odometry/se3.hpp"
 
 namespace stillmap::cli {
@@ -90,12 +92,13 @@ double restamp(Scan& scan, const std::string& how, double period_s) {
 std::vector<ImuSample> spoilt(std::vector<ImuSample> samples, const std::string& how) {
   if (how == "none") return {};
   const Eigen::Matrix3d turned =
-      Eigen::AngleAxisd(0.5 * M_PI, Eigen::Vector3d(1.0, 1.0, 1.0).normalized()).matrix();
+      Eigen::AngleAxisd(0.5 * std::numbers::pi, Eigen::Vector3d(1.0, 1.0, 1.0).normalized())
+          .matrix();
   const std::size_t breaks = samples.size() / 3;
   if (how == "stops") samples.resize(breaks);
   for (std::size_t k = 0; k < samples.size(); ++k) {
     ImuSample& sample = samples[k];
-    if (how == "deg_per_s") sample.angular_velocity_imu *= 180.0 / M_PI;
+    if (how == "deg_per_s") sample.angular_velocity_imu *= deg_per_rad;
     if (how == "turned") sample.angular_velocity_imu = turned * sample.angular_velocity_imu;
     if (how == "late") sample.stamp_ns += 20'000'000;
     if (how == "frozen" && k > breaks) {

@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
-#include <numbers>
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
@@ -11,6 +10,7 @@
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "config/loaders/robot_profile.hpp"
+#include "core/lidar/angle_units.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/picture/traversability_picture.hpp"
 
@@ -59,7 +59,7 @@ Goal place_of(const std::string& option, const std::vector<std::string>& words) 
                                 "frame, as 12.5,-3 or 12.5,-3,90");
   }
   Goal place{{values[0], values[1]}, std::nullopt};
-  if (values.size() == 3) place.heading_rad = values[2] * std::numbers::pi / 180.0;
+  if (values.size() == 3) place.heading_rad = values[2] * rad_per_deg;
   return place;
 }
 
