@@ -64,8 +64,8 @@ class LiveLoopCloser {
   [[nodiscard]] bool are_positions_refused() const { return closer_.are_positions_refused(); }
 
   /// The next scan of the map, by a pose that no correction moved, with the place of the receiver's
-  /// antenna on its lidar. A correction is of the map as
-  /// the corrections before have left it, and is taken to be carried out.
+  /// antenna on its lidar. A correction is of the map as the corrections before have left it, and
+  /// is taken to be carried out.
   [[nodiscard]] std::optional<MapCorrection> add(const LabelledScan& scan,
                                                  const Eigen::Isometry3d& T_odom_lidar,
                                                  bool is_confirmed,

@@ -58,9 +58,9 @@ struct Features {
 [[nodiscard]] std::vector<std::uint32_t> few_surfaces(const Scan& scan, const FeatureConfig& config,
                                                       const Features& features);
 
-/// Edge and plane points of every ring by their curvature (LOAM V-A, with
-/// the rejection of occluded and grazing points that A-LOAM dropped). `scan.ring` must be known.
-/// `up_lidar` as for extract_surfaces().
+/// Edge and plane points of every ring by their curvature (LOAM V-A, with the rejection of occluded
+/// and grazing points that A-LOAM dropped). `scan.ring` must be known. `up_lidar` as for
+/// extract_surfaces().
 [[nodiscard]] Features extract_features(const Scan& scan, const FeatureConfig& config,
                                         const Eigen::Vector3f& up_lidar = Eigen::Vector3f::UnitZ());
 

@@ -112,10 +112,10 @@ struct RegistrationConfig {
   double plane_deviation_m = 0.03;
   /// The same of lidars whose rings are far apart, with more and farther neighbours.
   double sparse_ring_plane_deviation_m = 0.05;
-  /// A plane tells little of a point that lies farther than this from the
-  /// middle of its neighbours, along the plane, in standard deviations of theirs (a Mahalanobis
-  /// distance): the few rings of the scans before, which err together, turn the plane about
-  /// themselves, and the next ring comes to lie beyond them. Not in the paper; 0 switches it off.
+  /// A plane tells little of a point that lies farther than this from the middle of its neighbours,
+  /// along the plane, in standard deviations of theirs (a Mahalanobis distance): the few rings of
+  /// the scans before, which err together, turn the plane about themselves, and the next ring comes
+  /// to lie beyond them. Not in the paper; 0 switches it off.
   double max_extrapolation = 1.5;
   /// Fewer correspondences than this give no pose.
   int min_correspondences = 50;

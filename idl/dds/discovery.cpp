@@ -176,8 +176,7 @@ enum class Ports {
   /// these reach who takes it over.
   closed,
   /// Of a living process, which may be this one, or of one that was killed. That one's shared
-  /// memory
-  /// is made anew, and who still has the old one open does not reach the new one.
+  /// memory is made anew, and who still has the old one open does not reach the new one.
   taken
 };
 

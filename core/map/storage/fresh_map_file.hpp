@@ -9,9 +9,9 @@
 namespace stillmap {
 
 /// A map file that is made beside the one whose place it is to take, or which a link of that name
-/// leads to. It lies in a folder of its
-/// own, "NAME.new-" and six letters more, so that neither it nor what SQLite puts beside it is ever
-/// a file of somebody else. Where it did not take the place, it goes with the object.
+/// leads to. It lies in a folder of its own, "NAME.new-" and six letters more, so that neither it
+/// nor what SQLite puts beside it is ever a file of somebody else. Where it did not take the place,
+/// it goes with the object.
 class FreshMapFile {
  public:
   enum class Writing : std::uint8_t {

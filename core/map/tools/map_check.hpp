@@ -42,8 +42,8 @@ using CheckProgress = std::function<void(std::size_t done, std::size_t total)>;
 
 /// Reads all of a map file, which stays as it is, and finds every fault: SQLite's own structure,
 /// each tile (decodes, agrees with its content hash and its row, voxels lie in their cells), sizes,
-/// revisions, poses finite and rigid. Throws MapFileError for a file that is not
-/// a map of a known version: missing, empty, a folder, of another program, of a newer version.
+/// revisions, poses finite and rigid. Throws MapFileError for a file that is not a map of a known
+/// version: missing, empty, a folder, of another program, of a newer version.
 [[nodiscard]] MapCheck check_map_file(const std::filesystem::path& file,
                                       const CheckProgress& progress = {});
 
