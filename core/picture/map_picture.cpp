@@ -255,10 +255,8 @@ ClassCounts count_classes(const MapSnapshot& view) {
 std::string title(const MapSnapshot& view, const Trajectory& estimate,
                   const MapPictureOptions& options) {
   if (view.tiles.empty()) return "The map is empty.";
-  std::size_t voxels = 0;
-  for (const auto& tile : view.tiles) voxels += tile->voxels.size();
   std::ostringstream text;
-  text << with_thousands(voxels) << " voxels of " << view.voxel_size_m << " m in "
+  text << with_thousands(view.tiles.voxel_count()) << " voxels of " << view.voxel_size_m << " m in "
        << view.tiles.size() << " tiles";
   if (options.looked_for) {
     text << ", " << estimate.size() << " of " << *options.looked_for << " found";

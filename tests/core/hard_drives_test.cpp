@@ -223,11 +223,7 @@ TEST(HardDrives, ACoveredLidarThatIsCarriedElsewhereIsNotGoodThereAndMapsNothing
     return mapped ? mapped->odometry.health : OdometryHealth::lost;
   };
   for (int k = 14; k < 17; ++k) static_cast<void>(health_of(covered(first.scan(k).scan)));
-  const auto count_voxels = [&mapper] {
-    std::size_t count = 0;
-    for (const auto& tile : mapper.map_snapshot()->tiles) count += tile->voxels.size();
-    return count;
-  };
+  const auto count_voxels = [&mapper] { return mapper.map_snapshot()->tiles.voxel_count(); };
   static_cast<void>(health_of(covered(second.scan(17).scan)));
   const std::size_t voxels = count_voxels();
   // Little tells the two places apart through the gap; all that is seen then does, in the map as

@@ -61,11 +61,7 @@ class LabelSynchronizerTest : public testing::Test {
   [[nodiscard]] float weight_in_map() const {
     return map_.readable()->evidence_at(place.cast<double>()).votes().front().weight;
   }
-  [[nodiscard]] std::size_t voxels_in_map() {
-    std::size_t voxels = 0;
-    for (const auto& tile : map_.map().view()->tiles) voxels += tile->voxels.size();
-    return voxels;
-  }
+  [[nodiscard]] std::size_t voxels_in_map() { return map_.map().view()->tiles.voxel_count(); }
 
   static SegmentationPipeline::Output finished(std::int64_t number, PointLabels labels,
                                                bool pending = false) {

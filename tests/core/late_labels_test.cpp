@@ -67,12 +67,6 @@ const BoxSequence& traffic_sequence() {
   return sequence;
 }
 
-std::size_t voxels_in(const MapSnapshot& view) {
-  std::size_t count = 0;
-  for (const auto& tile : view.tiles) count += tile->voxels.size();
-  return count;
-}
-
 /// Share of the voxels that are of the class that most votes of a reference map give them.
 /// Of voxels that several points hit: a single one has but the vote of its own scan.
 double share_of_agreeing_voxels(const MapSnapshot& view, const MapSnapshot& reference) {
@@ -137,7 +131,7 @@ TEST_P(LateLabels, MapAndPosesAreNearlyThoseOfLabelsInTime) {
   }
   EXPECT_GT(propagated.share(), right_share);
   const auto reference = in_time.map_snapshot(), view = late.map_snapshot();
-  EXPECT_GT(voxels_in(*view), voxels_in(*reference) * 7 / 10);
+  EXPECT_GT(view->tiles.voxel_count(), reference->tiles.voxel_count() * 7 / 10);
   EXPECT_GT(share_of_agreeing_voxels(*view, *reference), 0.975);
   for (const auto& tile : view->tiles) {
     for (const Voxel& voxel : tile->voxels) ASSERT_FALSE(is_movable(voxel.evidence.winner()));
@@ -172,7 +166,7 @@ TEST(MapperLabels, ASegmentationThatFailsGivesPureGeometry) {
     EXPECT_TRUE(mapped->labelled.labels.empty());
     test::expect_near(mapped->odometry.T_map_lidar, traffic_sequence().T_map_lidar[k], 0.2, 0.02);
   }
-  EXPECT_GT(voxels_in(*mapper.map_snapshot()), 1000U);
+  EXPECT_GT(mapper.map_snapshot()->tiles.voxel_count(), 1000U);
 }
 
 TEST(MapperLabels, ResetForgetsWhatWasPending) {

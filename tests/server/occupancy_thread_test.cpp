@@ -355,8 +355,7 @@ TEST_F(OccupancyThreadTest, BeginsAnotherMapWithItsViewAndForgetsScansOfTheOldOn
   StaticMap map{StaticMapConfig{}};
   map.insert(*room(5).labelled, room_pose(5).T_map_lidar);
   const auto view = map.view();
-  std::uint64_t voxels = 0;
-  for (const auto& tile : view->tiles) voxels += tile->voxels.size();
+  const std::uint64_t voxels = view->tiles.voxel_count();
   ASSERT_GT(voxels, 0U);
   thread.begin(view);
   ASSERT_TRUE(done(thread, 2));

@@ -133,7 +133,7 @@ DriveResult DriveRun::result() {
     pairs.truth.push_back(*pose.T_world_lidar_true);
     pairs.estimate.push_back(pose.T_map_lidar);
   }
-  for (const auto& tile : mapper_.map_snapshot()->tiles) result.voxels += tile->voxels.size();
+  result.voxels = mapper_.map_snapshot()->tiles.voxel_count();
   result.duration = duration_;
   result.processor_time = processor_time_;
   if (pairs.size() < 2) return result;

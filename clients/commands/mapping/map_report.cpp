@@ -20,12 +20,6 @@ double peak_memory_mb() {
   return static_cast<double>(usage.ru_maxrss) / 1024.0;  // Linux counts kB
 }
 
-std::uint64_t voxel_count(const MapSnapshot& view) {
-  std::uint64_t count = 0;
-  for (const auto& tile : view.tiles) count += tile->info.voxel_count;
-  return count;
-}
-
 Json optional_number(const std::optional<double>& value) {
   return value ? Json(*value) : Json(nullptr);
 }
@@ -213,7 +207,7 @@ Json to_json(const MappingResult& result, const MapOutput& output) {
       {"skipped", skipped_json(result.skipped)},
       {"recording_faults", faults},
       {"tiles", result.view->tiles.size()},
-      {"voxels", voxel_count(*result.view)},
+      {"voxels", result.view->tiles.voxel_count()},
       {"voxel_size_m", result.view->voxel_size_m},
       {"poses_frame", output.frame + "; the map is its frame at the first pose"},
       {"moving_points",
@@ -257,7 +251,7 @@ std::string describe(const MappingResult& result, const MapOutput& output) {
     text += std::string(" ") + name(state) + " " + std::to_string(count);
   }
   if (result.imu.samples > 0) text += "; " + describe_imu(result);
-  text += "\nmap: " + std::to_string(voxel_count(*result.view)) + " voxels of " +
+  text += "\nmap: " + std::to_string(result.view->tiles.voxel_count()) + " voxels of " +
           fixed(result.view->voxel_size_m, 2) + " m in " +
           std::to_string(result.view->tiles.size()) + " tiles; peak memory " +
           fixed(peak_memory_mb(), 0) + " MB\n";
