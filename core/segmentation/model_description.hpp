@@ -95,7 +95,7 @@ struct ModelDescription {
   /// Without it a point takes the class of its pixel.
   std::optional<KnnConfig> knn;
   /// Points vote once more in space, all of them, then those that are unsure, then what surrounds
-  /// vehicles; without one of these, that vote does not take place.
+  /// vehicles and the ground below them; without one of these, that vote does not take place.
   std::optional<VoxelVoteConfig> voxel_votes;
   std::optional<UnsureVoteConfig> unsure_votes;
   std::optional<IslandVoteConfig> island_votes;

@@ -17,6 +17,7 @@
 #include "core/lidar/range_image.hpp"
 #include "core/lidar/ranked_value.hpp"
 #include "core/segmentation/beam_origin.hpp"
+#include "core/segmentation/ground_votes.hpp"
 #include "core/segmentation/lidar_stance.hpp"
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/network_input.hpp"
@@ -107,7 +108,10 @@ PointLabels voted_labels(const RangeImage& image, const PixelLabels& pixels,
       model.knn ? knn_labels(image, pixels, *model.knn) : labels_of_own_pixel(image, pixels);
   if (model.voxel_votes) vote_in_voxels(points, *model.voxel_votes, labels);
   if (model.unsure_votes) vote_where_unsure(points, *model.unsure_votes, labels);
-  if (model.island_votes) vote_on_islands(points, *model.island_votes, labels);
+  if (model.island_votes) {
+    vote_on_islands(points, *model.island_votes, labels);
+    vote_below_vehicles(points, labels);
+  }
   return labels;
 }
 
