@@ -11,6 +11,7 @@
 #include "config/loaders/sensor_file.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/scan_dataset.hpp"
+#include "core/lidar/turn_joiner.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 
 namespace stillmap::python {
@@ -146,20 +147,28 @@ void bind_open_dataset(py::module_& module) {
   module.def(
       "open_dataset",
       [](const std::filesystem::path& path, const std::string& topic,
-         std::optional<bool> labels_are_classes) {
+         std::optional<bool> labels_are_classes, std::size_t clouds_per_turn) {
+        if (clouds_per_turn > TurnJoiner::most)
+          throw py::value_error("clouds_per_turn = " + std::to_string(clouds_per_turn) +
+                                "; must be 0.." + std::to_string(TurnJoiner::most));
         const py::gil_scoped_release released;
         std::optional<LabelKind> kind;
         if (labels_are_classes)
           kind = *labels_are_classes ? LabelKind::classes : LabelKind::semantic_kitti;
         auto shared = std::make_unique<SharedRecording>(dds::open_recording(path, topic, kind));
+        shared->recording.dataset.join_turns(clouds_per_turn);
         require_semantic_kitti_labels(shared->recording.dataset, path);
         return shared;
       },
       py::arg("path"), py::arg("topic") = "", py::arg("labels_are_classes") = py::none(),
+      py::arg("clouds_per_turn") = 0,
       "Opens a KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, or a ROS 2 bag "
       "(SQLite or MCAP). topic: of a bag with several topics of scans. labels_are_classes: True: "
       "its labels are classes 0 to 19; False: they are SemanticKITTI's ids; None: they are ids, "
-      "unless they do not look like it. Raises DatasetError, then, too.");
+      "unless they do not look like it. Raises DatasetError, then, too. clouds_per_turn: so many "
+      "clouds "
+      "that follow each other are a turn of the lidar, and one scan; 1: each is a scan; 0: found "
+      "out.");
 }
 
 }  // namespace

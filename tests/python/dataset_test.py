@@ -50,6 +50,23 @@ def test_classes_are_not_read_as_ids_without_a_word(city, tmp_path):
     assert list(as_ids[0].raw_labels[:5]) == [9, 13, 15, 17, 255]
 
 
+def test_parts_of_a_turn_are_one_scan(tmp_path):
+    for part in range(12):
+        azimuth = np.radians(180 * part + np.arange(180, dtype=np.float32))
+        wall = [
+            np.stack([12 * np.cos(azimuth), 12 * np.sin(azimuth), 0 * azimuth + z, 0 * azimuth], 1)
+            for z in np.linspace(-2, 2, 8)
+        ]
+        np.concatenate(wall).astype(np.float32).tofile(tmp_path / f"{part:06}.bin")
+    dataset = stillmap.open_dataset(tmp_path)
+    assert len(dataset) == 6 and len(dataset[2]) == 8 * 360
+    assert any("are joined" in remark for remark in dataset.remarks)
+    assert len(stillmap.open_dataset(tmp_path, clouds_per_turn=1)) == 12
+    assert len(stillmap.open_dataset(tmp_path, clouds_per_turn=3)) == 4
+    with pytest.raises(ValueError, match="clouds_per_turn = 201"):
+        stillmap.open_dataset(tmp_path, clouds_per_turn=201)
+
+
 def test_places_count_as_in_a_list(city):
     dataset = stillmap.open_dataset(city)
     np.testing.assert_array_equal(dataset[-1].points_lidar, dataset[len(dataset) - 1].points_lidar)

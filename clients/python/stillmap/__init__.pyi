@@ -99,7 +99,10 @@ class Dataset:
     def remarks(self) -> list[str]: ...
 
 def open_dataset(
-    path: Path, topic: str = "", labels_are_classes: bool | None = None
+    path: Path,
+    topic: str = "",
+    labels_are_classes: bool | None = None,
+    clouds_per_turn: int = 0,
 ) -> Dataset: ...
 
 class Voxels:
