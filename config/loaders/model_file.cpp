@@ -184,6 +184,7 @@ std::unique_ptr<Segmenter> open_network_labels(const LabelsConfig& labels,
   ModelDescription model =
       for_sensor(load_model_description(find_model(labels.model)), sensor, tilt);
   model.finds_stance = labels.finds_stance;
+  model.mirrored = labels.mirrored;
   if (labels.image_columns == 0) {
     return adaptive_width ? open_multi_resolution_model(model, labels.engine)
                           : open_model(model, labels.engine);

@@ -77,6 +77,7 @@ void read_labels(YamlSection section, LabelsConfig& labels) {
   section.integer("threads", labels.engine.threads, {0, 1024});
   section.integer("budget_ms", labels.budget_ms, {0, 60'000});
   section.choice<bool>("stance", labels.finds_stance, {{"auto", true}, {"mount", false}});
+  section.boolean("mirrored", labels.mirrored);
 }
 
 void check_frame(YamlSection& section, const std::string& field, const std::string& frame) {

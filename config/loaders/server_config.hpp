@@ -47,6 +47,8 @@ struct LabelsConfig {
   /// Where the mount tells neither a lean nor a height, they are those that the ground shows, scan
   /// by scan. False: as the mount says, whatever the ground shows.
   bool finds_stance = true;
+  /// Networks see each scan in a mirror, too, which takes twice the time.
+  bool mirrored = false;
 };
 
 /// Names of the coordinate frames in everything that is published (REP 105).

@@ -88,6 +88,8 @@ struct ModelDescription {
   /// Where no mount tells how the lidar leans and how high it is, the ground that it sees does (see
   /// stance_over_ground()). False: then it counts as upright, at `lidar_height_m`.
   bool finds_stance = true;
+  /// The network sees each scan in a mirror, too. See run_mirrored_too().
+  bool mirrored = false;
   InputStatistics statistics;
 
   /// Entry n is the class of the network's output n.

@@ -19,6 +19,7 @@
 #include "core/segmentation/beam_origin.hpp"
 #include "core/segmentation/ground_votes.hpp"
 #include "core/segmentation/lidar_stance.hpp"
+#include "core/segmentation/mirrored_view.hpp"
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/network_input.hpp"
 
@@ -173,6 +174,7 @@ std::string NetworkSegmenter::details() const {
   std::string text = levels_.front().network->engine() + ", image " + std::to_string(model_.rows) +
                      "x" + std::to_string(levels_.front().columns);
   if (levels_.size() > 1) text += " down to " + std::to_string(levels_.back().columns);
+  if (model_.mirrored) text += ", and mirrored";
   return text + (remark_.empty() ? "" : "; ") + remark_;
 }
 
@@ -301,8 +303,12 @@ PointLabels NetworkSegmenter::segment_with(SegmentationNetwork& network, int col
   std::optional<RangeImage> filled;
   if (model_.follow_sensor && image.share_in_gaps(max_gap) > max_share_in_gaps)
     filled = image.with_gaps_filled(max_gap);
-  PixelOutputs outputs = network.run(
-      make_network_input(points, scan.intensity, filled ? *filled : image, model_, view.raised_m));
+  const std::vector<float> input =
+      make_network_input(points, scan.intensity, filled ? *filled : image, model_, view.raised_m);
+  PixelOutputs outputs =
+      model_.mirrored ? run_mirrored_too(network, input, static_cast<std::size_t>(image.columns()),
+                                         model_.statistics)
+                      : network.run(input);
   const PixelLabels pixels = pixel_labels(std::move(outputs), model_);
   return voted_labels(image, pixels, points, model_);
 }

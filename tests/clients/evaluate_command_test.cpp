@@ -142,9 +142,17 @@ TEST_F(EvaluateCommandTest, ScansOfADriveVoteOnEachOthersLabels) {
   const nlohmann::json alone = evaluated(" --drive-votes off"), voted = evaluated("");
   EXPECT_EQ(voted.at("points"), alone.at("points"));
   EXPECT_GT(voted.at("accuracy"), alone.at("accuracy").get<double>() + 0.005);
+  EXPECT_FALSE(alone.at("drive_votes").get<bool>());
+  EXPECT_TRUE(voted.at("drive_votes").get<bool>());
   // Of one scan there are no others.
-  EXPECT_EQ(evaluated(" --scans 1").at("accuracy"),
+  EXPECT_EQ(evaluated(" --scans 1 --mirrored off").at("accuracy"),
             evaluated(" --scans 1 --drive-votes off").at("accuracy"));
+  // Whoever lets the drive vote has time for the mirror, too.
+  EXPECT_TRUE(voted.at("mirrored").get<bool>());
+  EXPECT_FALSE(alone.at("mirrored").get<bool>());
+  const nlohmann::json mirrored = evaluated(" --drive-votes off --mirrored on");
+  EXPECT_TRUE(mirrored.at("mirrored").get<bool>());
+  EXPECT_NE(mirrored.at("accuracy"), alone.at("accuracy"));
   // Scans without truth still tell where the others are.
   std::filesystem::remove(path("city/labels/000003.label"));
   const nlohmann::json fewer = evaluated("");
@@ -176,6 +184,10 @@ TEST_F(EvaluateCommandTest, BelievesTheMountAloneWhereAskedTo) {
     EXPECT_EQ(both.exit_code, 2);
     EXPECT_THAT(both.err, HasSubstr("--stance"));
   }
+  const ProcessResult mirrored =
+      run(command + " --predictions " + path("leaning/labels") + " --mirrored on");
+  EXPECT_EQ(mirrored.exit_code, 2);
+  EXPECT_THAT(mirrored.err, HasSubstr("--mirrored"));
 }
 
 TEST_F(EvaluateCommandTest, TellsTheNetworkHowTheLidarLeans) {

@@ -138,7 +138,7 @@ TEST_F(HelpTest, WhatSaysNothingOfLabelsInFilesIsRefused) {
 
 TEST_F(HelpTest, WhatSaysNothingOfALiveTopicIsRefused) {
   for (const std::string option : {"--start 3", "--strict", "--topic-in points",
-                                   "--label-kind classes", "--drive-votes off"}) {
+                                   "--label-kind classes", "--drive-votes off", "--mirrored on"}) {
     const ProcessResult result = run("dataset export topic:points x " + option);
     EXPECT_EQ(result.exit_code, 2) << option;
     EXPECT_THAT(result.err, HasSubstr(option.substr(0, option.find(' ')) + " is of recordings"));

@@ -49,7 +49,7 @@ TEST(ServerConfig, ReadsFieldsOfEveryKind) {
   const ServerConfig config = load(R"(
 sensor: vlp_16
 labels: {source: none, engine: onednn, precision: int8, threads: 3, image_columns: 512,
-         stance: mount}
+         stance: mount, mirrored: true}
 dds: {domain_id: 42, shared_memory: false, interfaces: [127.0.0.1],
       profile: wifi, peers: [a, "b:1"], discovery_server: c, socket_buffer_bytes: 99999}
 topics: {odometry_prior: ""}
@@ -65,6 +65,7 @@ static_map: {min_points: 5}
   EXPECT_EQ(config.labels.engine.threads, 3);
   EXPECT_EQ(config.labels.image_columns, 512);
   EXPECT_FALSE(config.labels.finds_stance);
+  EXPECT_TRUE(config.labels.mirrored);
   EXPECT_EQ(config.dds.domain_id, 42U);
   EXPECT_EQ(config.dds.network.shared_memory, std::optional<bool>(false));
   EXPECT_THAT(config.dds.network.interfaces, ::testing::ElementsAre("127.0.0.1"));

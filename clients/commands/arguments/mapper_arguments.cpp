@@ -53,6 +53,12 @@ void add_segmentation_options(CommandHandle command, MapperArguments& arguments)
               "says; where that tells neither, as the ground shows), mount (as the mount says, "
               "else upright); default: as configured, else auto")
       .one_of({"auto", "mount"});
+  command
+      .option("--mirrored", arguments.mirrored,
+              "on: a model that runs sees each scan a second time, in a mirror, and the mean of "
+              "both counts: it finds a little more, in twice the time; off: once; default: on with "
+              "--drive-votes on, else as configured, else off")
+      .one_of({"on", "off"});
 }
 
 void add_mapper_options(CommandHandle command, MapperArguments& arguments) {
@@ -158,6 +164,7 @@ LabelsConfig labels_config(const MapperArguments& arguments, const ScanDataset& 
   if (arguments.columns > 0) labels.image_columns = static_cast<int>(arguments.columns);
   set_engine(arguments.engine, labels.engine);
   if (!arguments.stance.empty()) labels.finds_stance = arguments.stance == "auto";
+  if (!arguments.mirrored.empty()) labels.mirrored = arguments.mirrored == "on";
   return labels;
 }
 

@@ -41,12 +41,14 @@ struct MapperArguments {
   EngineArguments engine;
   /// "auto" or "mount"; empty: as configured.
   std::string stance;
+  /// "on" or "off": whether the network sees each scan in a mirror, too; empty: as configured.
+  std::string mirrored;
 
   /// Whether `sensor` is one, and not left to the dataset.
   [[nodiscard]] bool names_sensor() const;
 };
 
-/// Adds --columns, --engine, --precision, --threads and --stance.
+/// Adds --columns, --engine, --precision, --threads, --stance and --mirrored.
 void add_segmentation_options(CommandHandle command, MapperArguments& arguments);
 /// Adds these and --config, --sensor, --labels, --weighting.
 void add_mapper_options(CommandHandle command, MapperArguments& arguments);

@@ -116,8 +116,9 @@ ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopS
   const std::size_t total = arguments.range.end(dataset) - arguments.range.first;
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
   const std::optional<Eigen::Isometry3d> mount = told_mount(arguments.mapper.config_file);
-  auto labels =
-      make_segmenter(arguments.mapper, dataset, mount.value_or(Eigen::Isometry3d::Identity()));
+  MapperArguments mapper = arguments.mapper;
+  mirror_with_drive_votes(arguments.drive_votes, mapper);
+  auto labels = make_segmenter(mapper, dataset, mount.value_or(Eigen::Isometry3d::Identity()));
   std::cerr << describe_sensor_mismatch(dataset, config.sensor)
             << describe_model(arguments.mapper, dataset, *labels)
             << (mount || labels->details().empty()
@@ -149,6 +150,7 @@ void check_options_of_topic(const DatasetExportArguments& arguments) {
                              : !arguments.recording.topic_in.empty()   ? "--topic-in"
                              : !arguments.recording.label_kind.empty() ? "--label-kind"
                              : !arguments.drive_votes.empty()          ? "--drive-votes"
+                             : !arguments.mapper.mirrored.empty()      ? "--mirrored"
                                                                        : nullptr;
   if (option == nullptr) return;
   throw std::invalid_argument(std::string(option) + " is of recordings, and " + arguments.source +

@@ -27,6 +27,10 @@ OptionHandle add_drive_votes_option(CommandHandle command, std::string& drive_vo
       .one_of({"on", "off"});
 }
 
+void mirror_with_drive_votes(const std::string& drive_votes, MapperArguments& mapper) {
+  if (drive_votes != "off" && mapper.mirrored.empty()) mapper.mirrored = "on";
+}
+
 void DriveLabels::add(const MappedScan& mapped, PointLabels labels) {
   const OdometryHealth health = mapped.odometry.health;
   const bool has_pose = health == OdometryHealth::initialised || health == OdometryHealth::good;

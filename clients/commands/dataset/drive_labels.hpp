@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/terminal/command_line.hpp"
 #include "core/mapper.hpp"
 #include "core/segmentation/drive_votes.hpp"
@@ -14,6 +15,10 @@ namespace stillmap::cli {
 
 /// Adds --drive-votes, which says "on" or "off"; empty where it is not given, which is on.
 OptionHandle add_drive_votes_option(CommandHandle command, std::string& drive_votes);
+
+/// Whoever has time for the votes of a drive has it for what a network sees in a mirror: with them
+/// --mirrored is on where it is not given.
+void mirror_with_drive_votes(const std::string& drive_votes, MapperArguments& mapper);
 
 /// The labels that a segmenter found for the scans of a recorded drive, after the votes of the
 /// scans around each, for whoever has poses of them.

@@ -247,20 +247,33 @@ SequenceScore run_model(const EvaluateSegmentationArguments& arguments, std::siz
   return {sequence, result.score};
 }
 
-/// Files were predicted as whoever made them took the lidar to stand.
-void refuse_stance(const EvaluateSegmentationArguments& arguments) {
-  for (const auto& [option, is_given] : {std::pair("--mount", !arguments.mount.xyz_rpy.empty()),
-                                         std::pair("--stance", !arguments.mapper.stance.empty())}) {
+/// Files were predicted as whoever made them took the lidar to stand, and let a model see it.
+void refuse_view(const EvaluateSegmentationArguments& arguments) {
+  for (const auto& [option, is_given] :
+       {std::pair("--mount", !arguments.mount.xyz_rpy.empty()),
+        std::pair("--stance", !arguments.mapper.stance.empty()),
+        std::pair("--mirrored", !arguments.mapper.mirrored.empty())}) {
     if (is_given)
       throw std::invalid_argument(std::string(option) +
                                   " is for a model that runs, not for --predictions");
   }
 }
 
-ExitCode run(const EvaluateSegmentationArguments& arguments) {
-  std::vector<SequenceScore> sequences;
-  if (!arguments.predictions.empty()) refuse_stance(arguments);
+Json json_of(const EvaluateSegmentationArguments& arguments,
+             const std::vector<SequenceScore>& sequences) {
+  Json json = segmentation_json(sequences);
   if (arguments.predictions.empty()) {
+    json.set("drive_votes", arguments.drive_votes != "off");
+    json.set("mirrored", arguments.mapper.mirrored == "on");
+  }
+  return json;
+}
+
+ExitCode run(EvaluateSegmentationArguments arguments) {
+  std::vector<SequenceScore> sequences;
+  if (!arguments.predictions.empty()) refuse_view(arguments);
+  if (arguments.predictions.empty()) {
+    mirror_with_drive_votes(arguments.drive_votes, arguments.mapper);
     for (std::size_t number = 0; number < arguments.truth.size(); ++number) {
       sequences.push_back(run_model(arguments, number));
     }
@@ -270,7 +283,7 @@ ExitCode run(const EvaluateSegmentationArguments& arguments) {
     throw std::invalid_argument("--predictions are those of one sequence, --truth names " +
                                 std::to_string(arguments.truth.size()));
   }
-  std::cout << (arguments.json ? segmentation_json(sequences).dump(2) + "\n"
+  std::cout << (arguments.json ? json_of(arguments, sequences).dump(2) + "\n"
                                : segmentation_text(sequences));
   return ExitCode::ok;
 }
