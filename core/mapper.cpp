@@ -161,7 +161,7 @@ std::optional<MappedScan> Mapper::process(
       odometry_.register_scan(scan, sweep, labels.labels, T_odom_lidar_known, inertial);
   const Eigen::Isometry3d T_odom_lidar = step.result.T_map_lidar;
   move_to_map(step.result);
-  confirm_relocation(step.result);
+  const bool begins_elsewhere = confirm_relocation(step.result);
   teach_inertial(middle_ns, step);
   is_placed_ |= step.result.health != OdometryHealth::lost;
   end_stage("odometry");
@@ -173,7 +173,8 @@ std::optional<MappedScan> Mapper::process(
                     {std::move(scan), std::move(labels.labels), std::move(step.motion)},
                     labels.unlabelled_may_move(),
                     T_odom_lidar,
-                    0};
+                    0,
+                    begins_elsewhere};
   mapped.entered_before = enter_map(mapped, labels);
   remember({mapped.labelled.scan.stamp_ns, step.result.T_map_lidar});
   end_stage("static_map");
@@ -413,18 +414,19 @@ void Mapper::relocate(Odometry followed, int confirming_scans) {
   is_resumed_map_held_ = false;
 }
 
-void Mapper::confirm_relocation(OdometryResult& result) {
-  if (scans_to_confirm_ == 0) return;
+bool Mapper::confirm_relocation(OdometryResult& result) {
+  if (scans_to_confirm_ == 0) return false;
   const bool fits = result.health == OdometryHealth::good && result.is_confirmed();
   confirming_scans_ = fits ? confirming_scans_ + 1 : 0;
   if (confirming_scans_ >= scans_to_confirm_) {
     scans_to_confirm_ = 0;
-    return;
+    return true;
   }
   result.map_entry = MapEntry::stays_out_with_waiting;
   if (fits) result.health = OdometryHealth::degenerate;
   // It looks as if it were known to centimetres, or it is in another place.
   result.covariance = unknown_pose_covariance();
+  return false;
 }
 
 void Mapper::add_prior_map_near(const Eigen::Vector3d& position_map) {

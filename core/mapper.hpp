@@ -45,6 +45,8 @@ struct MappedScan {
   Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
   /// So many scans before it have waited, and enter the map with it: see MapEntry.
   std::size_t entered_before = 0;
+  /// The first one in the map since Mapper::relocate(): the way from those before it is not known.
+  bool begins_elsewhere = false;
 };
 
 /// Why a scan was not mapped.
@@ -265,7 +267,8 @@ class Mapper {
   /// By its entry, with those that wait. Returns how many of these entered.
   std::size_t enter_map(const MappedScan& mapped, const LabelSynchronizer::Labels& labels);
   /// Where the lidar was relocated, a scan is no part of the map until enough of them fitted.
-  void confirm_relocation(OdometryResult& result);
+  /// True for the first one that is.
+  [[nodiscard]] bool confirm_relocation(OdometryResult& result);
   void end_stage(std::string_view stage) const;
 
   MapperConfig config_;

@@ -15,15 +15,15 @@ namespace {
 /// What a closure counts as, of way, for the drift between the places that it joins [m].
 constexpr double way_of_closure_m = 10.0;
 
-PoseEdge odometry_edge(std::size_t from, const Eigen::Isometry3d& T_from_to, double way_m,
-                       const DriftModel& drift) {
+PoseEdge odometry_edge(std::size_t from, std::size_t to, const Eigen::Isometry3d& T_from_to,
+                       double way_m, const DriftModel& drift) {
   // A lidar that turns on the spot has no way, but errs.
   const double way = std::max(way_m, 0.3);
   Eigen::Matrix<double, 6, 1> variance;
   variance << Eigen::Vector3d::Constant(drift.translation_m * drift.translation_m * way),
       Eigen::Vector3d::Constant(drift.rotation_rad * drift.rotation_rad * way);
   return {.from = from,
-          .to = from + 1,
+          .to = to,
           .T_from_to = T_from_to,
           .information = variance.cwiseInverse().asDiagonal(),
           .is_loop = false};
@@ -54,6 +54,8 @@ void LoopCloser::add(const LabelledScan& scan, const Eigen::Isometry3d& T_odom_l
   if (nodes_.empty()) {
     nodes_.push_back({index, 0.0});
     graph_.T_map_node.push_back(T_odom_lidar);
+  } else if (std::exchange(is_elsewhere_, false)) {
+    begin_elsewhere(index, T_odom_lidar);
   } else {
     const Eigen::Isometry3d motion = T_odom_lidar_[nodes_.back().scan].inverse() * T_odom_lidar;
     if (motion.translation().norm() >= config_.node_spacing_m ||
@@ -69,9 +71,32 @@ void LoopCloser::add_node(std::size_t scan, const Eigen::Isometry3d& T_odom_lida
   const Node& last = nodes_.back();
   const Eigen::Isometry3d motion = T_odom_lidar_[last.scan].inverse() * T_odom_lidar;
   const double way_m = motion.translation().norm();
-  graph_.edges.push_back(odometry_edge(nodes_.size() - 1, motion, way_m, config_.drift));
+  graph_.edges.push_back(
+      odometry_edge(nodes_.size() - 1, nodes_.size(), motion, way_m, config_.drift));
   graph_.T_map_node.push_back(graph_.T_map_node.back() * motion);
   nodes_.push_back({scan, last.way_m + way_m});
+}
+
+void LoopCloser::go_on_elsewhere() {
+  if (nodes_.empty()) return;
+  if (!builder_.empty()) close_submap();
+  is_elsewhere_ = true;
+}
+
+void LoopCloser::begin_elsewhere(std::size_t scan, const Eigen::Isometry3d& T_odom_lidar) {
+  const auto motion_from = [&](const Node& node) {
+    return T_odom_lidar_[node.scan].inverse() * T_odom_lidar;
+  };
+  const auto nearest = std::ranges::min_element(
+      nodes_, {}, [&](const Node& node) { return motion_from(node).translation().norm(); });
+  const Eigen::Isometry3d motion = motion_from(*nearest);
+  const auto from = static_cast<std::size_t>(nearest - nodes_.begin());
+  graph_.edges.push_back(
+      odometry_edge(from, nodes_.size(), motion, way_of_closure_m, config_.drift));
+  graph_.T_map_node.push_back(graph_.T_map_node[from] * motion);
+  first_node_of_submap_ = nodes_.size();
+  const double way_m = motion_from(nodes_.back()).translation().norm();
+  nodes_.push_back({scan, nodes_.back().way_m + way_m});
 }
 
 void LoopCloser::finish() {

@@ -129,6 +129,9 @@ class LoopCloser {
   void add(const LabelledScan& scan, const Eigen::Isometry3d& T_odom_lidar, bool is_confirmed) {
     add(scan, T_odom_lidar, is_confirmed, T_odom_lidar_.size());
   }
+  /// The next confirmed scan is where what was seen near it before has it: nothing tells the way
+  /// there from the scans until now.
+  void go_on_elsewhere();
   /// A position of one of the scans added so far. Those of scans before the first node say nothing.
   void add(const PositionAtScan& position);
   /// Instead of those until now, which were of another origin or at other times.
@@ -204,6 +207,8 @@ class LoopCloser {
   };
 
   void add_node(std::size_t scan, const Eigen::Isometry3d& T_odom_lidar);
+  /// Begins a submap at a node that hangs on the nearest one.
+  void begin_elsewhere(std::size_t scan, const Eigen::Isometry3d& T_odom_lidar);
   void close_submap();
   /// Looks for the submap in the earlier map.
   void find_in_earlier_map(std::size_t submap);
@@ -273,6 +278,7 @@ class LoopCloser {
   std::vector<std::size_t> numbers_;
   std::vector<Node> nodes_;
   std::size_t first_node_of_submap_ = 0;
+  bool is_elsewhere_ = false;
   PoseGraph graph_;
   std::vector<PlacedSubmap> submaps_;
   /// Those that wait for a second one.

@@ -29,9 +29,13 @@ struct Header {
   std::uint64_t points = 0;
   std::uint64_t packed_bytes = 0;
   std::uint32_t entry = 0;
-  std::uint32_t has_labels = 0;
+  std::uint32_t flags = 0;
   double step_m = 0.0;
 };
+
+/// Of Header::flags.
+constexpr std::uint32_t has_labels = 1;
+constexpr std::uint32_t begins_elsewhere = 2;
 
 /// Planes of bytes, one after the other: low and high bytes of the differences of x, y and z from
 /// point to point, classes, confidence, motion.
@@ -98,7 +102,7 @@ LabelledScan from_planes(std::span<const std::uint8_t> bytes, const Header& head
   }
   for (std::size_t i = 0; i < count; ++i)
     labelled.motion[i] = static_cast<Motion>(bytes[8 * count + i]);
-  if (header.has_labels == 0) return labelled;
+  if ((header.flags & has_labels) == 0U) return labelled;
   for (std::size_t i = 0; i < count; ++i) {
     labelled.labels.classes.push_back(static_cast<SemanticClass>(bytes[6 * count + i]));
     labelled.labels.confidence.push_back(static_cast<float>(bytes[7 * count + i]) / 255.0F);
@@ -130,7 +134,8 @@ Header header_of(const LoggedScan& scan) {
   header.points = has_points(scan.entry) ? scan.labelled.scan.size() : 0;
   header.entry =
       static_cast<std::uint32_t>(std::ranges::find(entries, scan.entry) - entries.begin());
-  header.has_labels = scan.labelled.labels.empty() ? 0U : 1U;
+  header.flags = (scan.labelled.labels.empty() ? 0U : has_labels) |
+                 (scan.begins_elsewhere ? begins_elsewhere : 0U);
   return header;
 }
 
@@ -201,6 +206,7 @@ LoggedScan ScanLog::at(std::size_t place) {
   LoggedScan scan{.index = header.index,
                   .T_odom_lidar = Eigen::Isometry3d::Identity(),
                   .entry = entries[header.entry],
+                  .begins_elsewhere = (header.flags & begins_elsewhere) != 0U,
                   .labelled = from_planes(bytes, header)};
   scan.T_odom_lidar.matrix().topRows<3>() =
       Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(header.pose.data());

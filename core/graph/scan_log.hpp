@@ -20,6 +20,8 @@ struct LoggedScan {
   Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
   /// Only scans that enter the map or may do so later have points.
   MapEntry entry = MapEntry::enters;
+  /// See MappedScan.
+  bool begins_elsewhere = false;
   /// Points [m] in steps of 4 mm, or of 1/32767 of the log's reach; classes; confidence in 1/255;
   /// motion. Points beyond the reach, or beyond 131 m where that is more, are nearer on their rays.
   LabelledScan labelled;

@@ -14,9 +14,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Outcome = GlobalLocalization::Outcome;
 
-/// A lidar that was placed is looked for when it has been lost for so long: mostly the mapper finds
-/// it again by itself.
-constexpr std::int64_t patience_ns = 3'000'000'000;
 /// A search of a second's length, at 20 Hz.
 constexpr std::size_t max_waiting_scans = 20;
 /// Of one search to the next, at most.
@@ -115,7 +112,7 @@ std::optional<Eigen::Isometry3d> PlaceFinder::relocate(Mapper& mapper, std::int6
   const std::scoped_lock lock(mutex_);
   if (!found_) return std::nullopt;
   GlobalLocalization::Place place = *std::exchange(found_, std::nullopt);
-  lost_since_ns_.reset();
+  watch_.forget();
   const Eigen::Isometry3d T_map_lidar = place.T_map_odom * place.odometry.predict(stamp_ns);
   mapper.relocate(std::move(place.odometry));
   return T_map_lidar;
@@ -136,14 +133,8 @@ void PlaceFinder::add(const Scan& scan, const PointLabels& labels,
 void PlaceFinder::update(std::int64_t stamp_ns, const OdometryResult& odometry,
                          const Mapper& mapper) {
   const std::scoped_lock lock(mutex_);
-  if (odometry.health != OdometryHealth::lost && odometry.is_confirmed()) {
-    lost_since_ns_.reset();
-    if (search_ != 0 && !guess_) end_search();
-    return;
-  }
-  // A clock may have been set back.
-  if (!lost_since_ns_ || *lost_since_ns_ > stamp_ns) lost_since_ns_ = stamp_ns;
-  const bool is_due = !mapper.is_placed() || stamp_ns - *lost_since_ns_ >= patience_ns;
+  const bool is_due = watch_.is_due(stamp_ns, odometry, mapper.is_placed());
+  if (LostWatch::knows_place(odometry) && search_ != 0 && !guess_) end_search();
   // What was found while this scan was in work is for the next one.
   if (search_ == 0 && !found_ && is_due && !map_.is_empty()) begin_search(std::nullopt);
 }
@@ -161,14 +152,14 @@ void PlaceFinder::end_search() {
 }
 
 void PlaceFinder::forget() {
-  lost_since_ns_.reset();
+  watch_.forget();
   const std::scoped_lock lock(mutex_);
   end_search();
   found_.reset();
 }
 
 void PlaceFinder::map_corrected() {
-  lost_since_ns_.reset();
+  watch_.forget();
   const std::scoped_lock lock(mutex_);
   std::optional<PlaceGuess> guess = guess_;
   if (found_ && last_.scan) {

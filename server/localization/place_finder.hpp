@@ -10,6 +10,7 @@
 
 #include "config/loaders/server_config.hpp"
 #include "core/localization/global_localization.hpp"
+#include "core/localization/lost_lidar_search.hpp"
 #include "core/localization/place_guess.hpp"
 #include "core/map/query/tile_reader.hpp"
 #include "core/mapper.hpp"
@@ -125,7 +126,7 @@ class PlaceFinder {
   Statistics& statistics_;
   SearchableMap map_;
   /// Of the mapping thread.
-  std::optional<std::int64_t> lost_since_ns_;
+  LostWatch watch_;
 
   mutable std::mutex mutex_;
   MapperConfig mapper_config_;

@@ -1,7 +1,6 @@
 #include <cmath>
 #include <numbers>
 #include <set>
-#include <sstream>
 #include <tuple>
 #include <vector>
 
@@ -9,6 +8,7 @@
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/simulation/simulation.hpp"
 #include "tests/clients/command_test.hpp"
+#include "tests/clients/kitti_poses.hpp"
 #include "tests/clients/unusable_maps.hpp"
 
 namespace stillmap::test {
@@ -51,17 +51,6 @@ class OntoCommandTest : public CommandTest {
   [[nodiscard]] nlohmann::json report_of(const std::string& folder) const {
     return nlohmann::json::parse(content(folder + "/report.json"));
   }
-  [[nodiscard]] std::vector<Eigen::Isometry3d> poses_of(const std::string& file) const {
-    std::istringstream lines(content(file));
-    std::vector<Eigen::Isometry3d> poses;
-    for (std::string line; std::getline(lines, line);) {
-      std::istringstream numbers(line);
-      Eigen::Isometry3d& T = poses.emplace_back(Eigen::Isometry3d::Identity());
-      for (int i = 0; i < 12; ++i) numbers >> T.matrix()(i / 4, i % 4);
-    }
-    return poses;
-  }
-
   void expect_true_poses() const;
   void expect_a_report() const;
   void expect_that_cars_went_and_came() const;
@@ -85,7 +74,7 @@ TEST_F(OntoCommandTest, PutsADriveOntoTheMapOfAnotherDay) {
 void OntoCommandTest::expect_true_poses() const {
   const simulation::Simulation one = yard_of(1), two = yard_of(2);
   const Eigen::Isometry3d T_map_city = one.T_map_lidar_at(0.0).inverse();
-  const auto poses = poses_of("both/poses_lidar.txt");
+  const auto poses = kitti_poses(content("both/poses_lidar.txt"));
   ASSERT_EQ(poses.size(), static_cast<std::size_t>(scans));
   for (int k = 0; k < scans; ++k) {
     const Eigen::Isometry3d truth =

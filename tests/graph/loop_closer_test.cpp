@@ -74,6 +74,31 @@ TEST(LoopCloser, SecondRoundTakesTheDriftOut) {
             0.35 * rmse_m(two_rounds.odometry, two_rounds));
 }
 
+// A lidar that was carried off, and found where the first round's scans have it.
+TEST(LoopCloser, WhatIsFoundElsewhereStaysWhereItWasFoundAsLoopsMoveThat) {
+  const StreetWorld world(11);
+  const Drive once = drive(world, 1.3 * StreetWorld::length_m, 0.0001, 0.003);
+  const Eigen::Isometry3d T_map_first = world.T_map_lidar_at(0.0, false);
+  LoopCloser closer{LoopClosingConfig{}};
+  const auto add = [&](std::size_t k, std::uint64_t seed) {
+    closer.add(world.scan_at(T_map_first * once.truth[k], seed + k), once.odometry[k], true);
+  };
+  for (std::size_t k = 0; k < once.truth.size(); ++k) add(k, 100);
+  constexpr std::size_t found_at = 150, scans = 60;
+  closer.go_on_elsewhere();
+  for (std::size_t k = found_at; k < found_at + scans; ++k) add(k, 9000);
+  closer.finish();
+  ASSERT_FALSE(closer.closures().empty());
+  const std::vector<Eigen::Isometry3d> poses = closer.corrected_poses();
+  ASSERT_EQ(poses.size(), once.truth.size() + scans);
+  EXPECT_GT((poses[found_at].translation() - once.odometry[found_at].translation()).norm(), 0.3)
+      << "else nothing is shown";
+  for (std::size_t k = 0; k < scans; ++k) {
+    const Eigen::Isometry3d off = poses[found_at + k].inverse() * poses[once.truth.size() + k];
+    EXPECT_LT(off.translation().norm(), 0.1) << k;
+  }
+}
+
 /// Closures of a drive of so many metres that sinks by 1.9 m in a round; nothing where one is off
 /// by more than 0.15 m.
 std::optional<std::size_t> closures_of_sinking(double ways_m, const StreetWorld& world) {

@@ -34,6 +34,7 @@ LoggedScan random_scan(std::uint64_t index, bool has_labels) {
 void expect_same(const LoggedScan& read, const LoggedScan& written) {
   EXPECT_EQ(read.index, written.index);
   EXPECT_EQ(read.entry, written.entry);
+  EXPECT_EQ(read.begins_elsewhere, written.begins_elsewhere);
   EXPECT_EQ(read.T_odom_lidar.matrix(), written.T_odom_lidar.matrix());
   EXPECT_EQ(read.labelled.scan.stamp_ns, written.labelled.scan.stamp_ns);
   ASSERT_EQ(read.labelled.scan.size(), written.labelled.scan.size());
@@ -62,6 +63,7 @@ TEST(ScanLog, ScansComeBack) {
   LoggedScan waits = random_scan(7, false), decides = random_scan(8, true);
   waits.entry = MapEntry::waits;
   decides.entry = MapEntry::enters_with_waiting;
+  decides.begins_elsewhere = true;
   LoggedScan unknown = random_scan(9, false);
   unknown.entry = MapEntry::stays_out_with_waiting;
   for (const LoggedScan& scan : {labelled, plain, lost, waits, decides, unknown}) log.append(scan);

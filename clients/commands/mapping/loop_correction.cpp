@@ -57,32 +57,31 @@ void LoopCorrection::resume(std::size_t next_scan, std::size_t poses) {
             " scans that were mapped until the run was stopped (power lost, a damaged disk, or "
             "another version of Stillmap); begin anew with --force");
   }
-  log_.read([this](const LoggedScan& scan) {
-    add(scan.index, scan.labelled, scan.T_odom_lidar, scan.entry);
-  });
+  log_.read([this](const LoggedScan& scan) { add(scan); });
 }
 
 void LoopCorrection::add(std::size_t index, const MappedScan& mapped) {
   const Timed timed(seconds_);
-  const OdometryResult& odometry = mapped.odometry;
-  log_.append({.index = index,
-               .T_odom_lidar = odometry.T_map_lidar,
-               .entry = odometry.map_entry,
-               .labelled = mapped.labelled});
-  add(index, mapped.labelled, odometry.T_map_lidar, odometry.map_entry);
+  const LoggedScan scan{.index = index,
+                        .T_odom_lidar = mapped.odometry.T_map_lidar,
+                        .entry = mapped.odometry.map_entry,
+                        .begins_elsewhere = mapped.begins_elsewhere,
+                        .labelled = mapped.labelled};
+  log_.append(scan);
+  add(scan);
 }
 
-void LoopCorrection::add(std::size_t index, const LabelledScan& scan,
-                         const Eigen::Isometry3d& T_odom_lidar, MapEntry entry) {
-  index_.push_back(index);
-  T_odom_lidar_.push_back(T_odom_lidar);
-  const bool waits = entry == MapEntry::waits;
-  if (waits || (entry == MapEntry::stays_out && !may_enter_.empty())) {
+void LoopCorrection::add(const LoggedScan& scan) {
+  index_.push_back(scan.index);
+  T_odom_lidar_.push_back(scan.T_odom_lidar);
+  const bool waits = scan.entry == MapEntry::waits;
+  if (waits || (scan.entry == MapEntry::stays_out && !may_enter_.empty())) {
     may_enter_.push_back(waits);
     return;
   }
-  close_waiting(entry);
-  close(index_.size() - 1, scan, is_confirmed(entry));
+  close_waiting(scan.entry);
+  if (scan.begins_elsewhere) closer_.go_on_elsewhere();
+  close(index_.size() - 1, scan.labelled, is_confirmed(scan.entry));
 }
 
 void LoopCorrection::close_waiting(MapEntry entry) {

@@ -106,10 +106,9 @@ class LoopCorrection {
   [[nodiscard]] LoopReport report() const;
 
  private:
-  /// The next scan, by its number in the data set. One that waits, and those after it, are handed
-  /// to the closer once it is decided where they are.
-  void add(std::size_t index, const LabelledScan& scan, const Eigen::Isometry3d& T_odom_lidar,
-           MapEntry entry);
+  /// The next scan. One that waits, and those after it, are handed to the closer once it is decided
+  /// where they are.
+  void add(const LoggedScan& scan);
   /// Hands those to the closer that have waited for this entry.
   void close_waiting(MapEntry entry);
   /// Leaves out those with stamps before that.

@@ -187,6 +187,8 @@ std::string pose_file_of(const std::string& frame) {
 Json to_json(const MappingResult& result, const MapOutput& output) {
   Json health = Json::object();
   for (const auto& [state, count] : result.health) health.set(name(state), count);
+  Json found_again = Json::array();
+  for (const std::size_t scan : result.found_again_at) found_again.push_back(scan);
   Json faults = Json::array();
   for (const std::string& fault : output.recording_faults) faults.push_back(fault);
   const StageDurations& total = result.stages.back();
@@ -204,6 +206,7 @@ Json to_json(const MappingResult& result, const MapOutput& output) {
       {"sensor", {{"name", output.sensor}, {"told_by", output.sensor_origin}}},
       {"label_source", result.label_source},
       {"health", health},
+      {"found_again_at_scans", found_again},
       {"skipped", skipped_json(result.skipped)},
       {"recording_faults", faults},
       {"tiles", result.view->tiles.size()},
@@ -250,6 +253,8 @@ std::string describe(const MappingResult& result, const MapOutput& output) {
   for (const auto& [state, count] : result.health) {
     text += std::string(" ") + name(state) + " " + std::to_string(count);
   }
+  if (const std::size_t times = result.found_again_at.size(); times > 0)
+    text += "; lost, and found again in the whole map: " + std::to_string(times) + " x";
   if (result.imu.samples > 0) text += "; " + describe_imu(result);
   text += "\nmap: " + std::to_string(result.view->tiles.voxel_count()) + " voxels of " +
           fixed(result.view->voxel_size_m, 2) + " m in " +

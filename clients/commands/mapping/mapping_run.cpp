@@ -9,6 +9,7 @@
 #include "clients/commands/mapping/sample_feed.hpp"
 #include "clients/commands/mapping/scans_ahead.hpp"
 #include "core/dataset/dataset_error.hpp"
+#include "core/localization/lost_lidar_search.hpp"
 #include "core/map/map_id.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "core/odometry/se3.hpp"
@@ -36,9 +37,14 @@ class MappingRun {
         listeners_(listeners),
         T_body_lidar_(task.body.T_body_lidar),
         scans_(task.dataset, task.config, std::move(labels)),
-        mapper_(task.config, scans_.segmenter(),
-                {.stage_ended = [this](std::string_view stage) { times_.end_stage(stage); },
-                 .pose_found = {}}),
+        mapper_(
+            task.config, scans_.segmenter(),
+            {.stage_ended = [this](std::string_view stage) { times_.end_stage(stage); },
+             .pose_found = {},
+             .scan_prepared = [this](const Scan& scan,
+                                     const PointLabels& labels) { search_.follow(scan, labels); }}),
+        search_(task.config.odometry, task.config.sensor, T_body_lidar_,
+                [this] { return mapper_.map_snapshot(); }),
         imu_(task.dataset.imu()) {
     mapper_.reset(new_map_id());
     if (!T_body_lidar_.isApprox(Eigen::Isometry3d::Identity()))
@@ -85,13 +91,10 @@ class MappingRun {
          imu_.take_up_to_end_of(frame->scan, task_.config.sensor.period_s))
       mapper_.add(sample);
     times_.begin();
-    std::optional<Eigen::Isometry3d> T_map_lidar_first;
-    // Until the lidar is found in the earlier map, every scan is looked for where that leads.
-    if (!earlier_.empty() && !is_registered_) {
-      T_map_lidar_first = lidar_pose_at(frame->scan.stamp_ns);
-    }
+    const auto T_map_lidar_known = prior_for(frame->scan.stamp_ns);
+    mapper_.hand_out_scans(search_.is_on());
     const std::optional<MappedScan> mapped =
-        mapper_.process(std::move(frame->scan), T_map_lidar_first);
+        mapper_.process(std::move(frame->scan), T_map_lidar_known);
     if (!mapped) {
       skip({index, mapper_.last_rejection().counter,
             task_.dataset.file(index).string() + ": " + mapper_.last_rejection().reason});
@@ -102,6 +105,8 @@ class MappingRun {
     result_.scan_of_pose.push_back(index);
     result_.health[mapped->odometry.health] += 1;
     is_registered_ |= mapped->odometry.health != OdometryHealth::lost;
+    search_.update(mapped->labelled.scan.stamp_ns, mapped->odometry, mapper_.is_placed());
+    if (mapped->begins_elsewhere) result_.found_again_at.push_back(index);
     if (loops_) loops_->add(index, *mapped);
     if (!true_ids.empty())
       result_.moving += evaluation::moving_score(mapped->labelled.motion, true_ids);
@@ -166,6 +171,21 @@ class MappingRun {
     if (interval_ns <= 0.0 || interval_ns > max_ns || since_ns <= 0.0) return last.T_map_lidar;
     return last.T_map_lidar * scaled_motion(before_last.T_map_lidar.inverse() * last.T_map_lidar,
                                             std::min(since_ns, max_ns) / interval_ns);
+  }
+
+  /// Where the next scan is known to be, if anywhere.
+  [[nodiscard]] std::optional<Eigen::Isometry3d> prior_for(std::int64_t stamp_ns) {
+    if (auto place = search_.take_place()) {
+      is_relocated_ = true;
+      const Eigen::Isometry3d T_map_lidar = place->T_map_odom * place->odometry.predict(stamp_ns);
+      mapper_.relocate(std::move(place->odometry));
+      return T_map_lidar;
+    }
+    // Until the lidar is found in the earlier run's map, every scan is looked for where that leads.
+    if (!earlier_.empty() && !is_registered_ && !is_relocated_) return lidar_pose_at(stamp_ns);
+    const Trajectory& path = mapper_.trajectory();
+    const bool is_to_be_found = !mapper_.is_placed() && !mapper_.begins_map();
+    return is_to_be_found && !path.empty() ? std::optional(path.back().T_map_lidar) : std::nullopt;
   }
 
   /// Where the stamps were set back, the mapper drops the poses of times to come.
@@ -259,10 +279,13 @@ class MappingRun {
   StageStopwatch times_;
   ScansAhead scans_;
   Mapper mapper_;
+  LostLidarSearch search_;
   std::optional<LoopCorrection> loops_;
   SampleFeed<ImuSample> imu_;
   Trajectory earlier_;
   bool is_registered_ = false;
+  /// It was found in the whole map.
+  bool is_relocated_ = false;
   std::uint64_t step_ = 0;
   MappingResult result_;
 };

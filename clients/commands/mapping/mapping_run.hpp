@@ -39,6 +39,9 @@ struct MappingResult {
   std::string label_source;
   std::vector<SkippedScan> skipped;
   std::map<OdometryHealth, std::size_t> health;
+  /// Numbers of the scans from which on the lidar, which was lost, was followed again where it was
+  /// found in the whole map.
+  std::vector<std::size_t> found_again_at;
   /// What became of the samples of the data set's IMU.
   InertialCounts imu;
   /// Nothing where no IMU was asked.
