@@ -130,7 +130,8 @@ PlaceHypothesis Localizer::align_at(const LocalizationQuery& query,
   const MapSurroundings surroundings(points);
   const Eigen::Isometry3d T =
       surroundings.align(query, T_map_lidar * query.T_upright_lidar.inverse());
-  PlaceHypothesis by_points{T * query.T_upright_lidar, surroundings.evidence(query, T)};
+  PlaceHypothesis by_points{.T_map_lidar = T * query.T_upright_lidar,
+                            .evidence = surroundings.evidence(query, T)};
   if (by_points.evidence.score() < config_.min_registered_score) return by_points;
   const auto on_surfaces = surroundings.align_surfaces(query, T);
   if (!on_surfaces) return by_points;
@@ -138,9 +139,15 @@ PlaceHypothesis Localizer::align_at(const LocalizationQuery& query,
   PlaceHypothesis place{.T_map_lidar = T_surfaces * query.T_upright_lidar,
                         .evidence = surroundings.evidence(query, T_surfaces),
                         .may_slide = on_surfaces->may_slide};
-  const bool is_worse =
-      place.evidence.score() < config_.min_kept_score * by_points.evidence.score();
-  return is_worse ? by_points : place;
+  const double points_score = by_points.evidence.score();
+  if (!on_surfaces->is_elsewhere)
+    return place.evidence.score() < config_.min_kept_score * points_score ? by_points : place;
+  // What stands up hardly tells how a lidar of few rings is tilted, as on a slope that the path's
+  // ground does not show.
+  if (place.evidence.score() > points_score && place.evidence.level >= by_points.evidence.level)
+    return place;
+  by_points.may_slide = true;
+  return by_points;
 }
 
 namespace {

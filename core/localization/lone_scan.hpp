@@ -24,14 +24,23 @@ enum class SweepMotionSource : std::uint8_t {
 /// "no times", "scans before", "map", "unknown".
 [[nodiscard]] const char* name(SweepMotionSource source);
 
-/// Motion of the lidar from the start to the end of a sweep, told by a map: what was measured in
-/// the first half of the sweep and in the second one is registered each for itself, from a pose
-/// within a metre of that in the middle, and the halves' poses are half a sweep apart. Nothing
-/// where a half is not believed there, or where the halves come to no steady motion.
-[[nodiscard]] std::optional<Eigen::Isometry3d> sweep_motion_in_map(
-    const Localizer& localizer, const Scan& scan, const PointLabels& labels,
-    const SweepTimes& sweep, const Eigen::Matrix3d& R_body_lidar,
-    const Eigen::Isometry3d& T_map_lidar);
+/// A sweep in a map.
+struct SweepInMap {
+  /// Motion of the lidar from its start to its end, and its pose in the middle.
+  Eigen::Isometry3d T_start_end = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d T_map_middle = Eigen::Isometry3d::Identity();
+  /// Both are known. Otherwise a half is not believed there, or the halves come to no steady
+  /// motion: it is about as large.
+  bool is_known = false;
+};
+
+/// The motion within a sweep, told by a map: what was measured in the first half of the sweep and
+/// in the second one is registered each for itself, from a pose within a metre of that in the
+/// middle, and the halves' poses are half a sweep apart.
+[[nodiscard]] SweepInMap sweep_in_map(const Localizer& localizer, const Scan& scan,
+                                      const PointLabels& labels, const SweepTimes& sweep,
+                                      const Eigen::Matrix3d& R_body_lidar,
+                                      const Eigen::Isometry3d& T_map_lidar);
 
 /// Where a scan is in a map, and what told its motion.
 struct StampedLocalization {
@@ -40,7 +49,8 @@ struct StampedLocalization {
 };
 
 /// Finds a prepared scan beside which there is no other one. Where its points have times, the pose
-/// is that at its stamp, as far as the map tells the motion. Throws what the localizer does.
+/// is that at its stamp, as far as the map tells the motion; where it does not, and the sweep was
+/// bent, it is ambiguous. Throws what the localizer does.
 [[nodiscard]] StampedLocalization localize_lone_scan(const Localizer& localizer, const Scan& scan,
                                                      const PointLabels& labels,
                                                      const Eigen::Matrix3d& R_body_lidar,

@@ -81,11 +81,11 @@ std::optional<SurfacePose> MapSurroundings::align_surfaces(
       register_features(query.features_upright, map_, wide.T_map_lidar, config);
   if (found.health == OdometryHealth::lost) return std::nullopt;
   const Eigen::Isometry3d way = T_map_upright.inverse() * found.T_map_lidar;
-  if (way.translation().norm() > max_way_m || Eigen::AngleAxisd(way.linear()).angle() > max_way_rad)
-    return std::nullopt;
+  const bool is_elsewhere =
+      way.translation().norm() > max_way_m || Eigen::AngleAxisd(way.linear()).angle() > max_way_rad;
   const OdometryResult judged =
       doubted_where_shift_fits(found, query.features_upright, map_, config);
-  return SurfacePose{found.T_map_lidar, judged.health != OdometryHealth::good};
+  return SurfacePose{found.T_map_lidar, judged.health != OdometryHealth::good, is_elsewhere};
 }
 
 PoseEvidence MapSurroundings::evidence(const LocalizationQuery& query,

@@ -45,6 +45,8 @@ struct SurfacePose {
   Eigen::Isometry3d T_map_upright = Eigen::Isometry3d::Identity();
   /// It lies about as well some way on, in a direction that little of it shows.
   bool may_slide = false;
+  /// Points aligned elsewhere, or tilted: one of both is wrong.
+  bool is_elsewhere = false;
 };
 
 /// The map round a pose, to register a scan in.
@@ -57,7 +59,7 @@ class MapSurroundings {
                                         const Eigen::Isometry3d& T_map_upright) const;
   /// The pose that the scan's points lie on the map's surfaces at, from where points aligned. Those
   /// of two scans do not meet: on smooth walls the rings of a lidar lie best on those of the one
-  /// that mapped them, and draw it to where that was. Nothing where they lead away from the start.
+  /// that mapped them, and draw it to where that was. Nothing where the scan shows too few.
   [[nodiscard]] std::optional<SurfacePose> align_surfaces(
       const LocalizationQuery& query, const Eigen::Isometry3d& T_map_upright) const;
   [[nodiscard]] PoseEvidence evidence(const LocalizationQuery& query,
