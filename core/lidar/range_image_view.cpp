@@ -237,7 +237,7 @@ void RangeImageView::mark_alone_in_column(int row, std::span<std::uint8_t> alone
     // Beams that are not evenly spaced leave a row empty here and there: is_thin() looks on.
     const bool goes_on_above = (above_m > 0.0F) & (above_m <= behind_m);
     const bool goes_on_below = (below_m > 0.0F) & (below_m <= behind_m);
-    alone[column] = (range_m > 0.0F) & !goes_on_above & !goes_on_below ? 1 : 0;
+    alone[column] = ((range_m > 0.0F) & !goes_on_above & !goes_on_below) ? 1 : 0;
   }
 }
 
