@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/odometry/expected_poses.hpp"
+#include "core/odometry/first_motion.hpp"
 #include "core/odometry/object_clusters.hpp"
 #include "core/odometry/relocalization.hpp"
 #include "core/odometry/ring_tangents.hpp"
@@ -242,6 +243,8 @@ void Odometry::State::straighten(const FeatureSets& features, std::int64_t time_
                                  const SweepTimes& sweep, OdometryResult& second) {
   if (!first_scan) return;
   const FirstScan first = *std::exchange(first_scan, std::nullopt);
+  // Points have told that it rests (first_motion_by_points), which no sweep bends.
+  if (second.T_map_lidar.isApprox(last.T_map_lidar)) return;
   // A rolling lidar's sweeps follow each other: stamps that say less are wrong.
   constexpr double min_sweeps = 0.9;
   const double stamped_s = intervals.stamped_since_last_s(time_ns);
@@ -260,6 +263,24 @@ void Odometry::State::straighten(const FeatureSets& features, std::int64_t time_
   // A straight first scan settles doubts that a bent one raised, but not this one.
   if (is_movable_denied && second.health == OdometryHealth::good)
     second.health = OdometryHealth::degenerate;
+}
+
+void Odometry::State::confirm(const FeatureSets& features, const PosePrediction& prediction,
+                              OdometryResult& result) const {
+  if (!started || config.paper_exact || result.health == OdometryHealth::lost) return;
+  const bool is_first_motion = last.interval_s <= 0.0 && !has_prior_map;
+  std::optional<OdometryResult> first;
+  if (is_first_motion && !is_by_surfaces)
+    first = first_motion_by_points(result, features, map, last, method());
+  result = first ? *first
+           : fits.are_known()
+               ? confirmed_by_points(result, features, map, method())
+               : confirmed_at_start(result, features, map, has_prior_map || goes_on, method());
+  if (result.health == OdometryHealth::good && fits.is_contradicted_by_points(result))
+    result = moved_where_points_agree(result, features, map, method());
+  if (fits.are_known() && is_unvouched(result, prediction, fits))
+    result.health = OdometryHealth::degenerate;
+  keep_to_limits(last, prediction, !has_jumped, sensor.motion_limits, result);
 }
 
 void Odometry::State::confirm_place(const FeatureSets& features, const PosePrediction& prediction,

@@ -114,17 +114,7 @@ struct Odometry::State {
                                              const PosePrediction& prediction) const;
   /// Asks the points for a second opinion, and the limits; the paper has neither.
   void confirm(const FeatureSets& features, const PosePrediction& prediction,
-               OdometryResult& result) const {
-    if (!started || config.paper_exact || result.health == OdometryHealth::lost) return;
-    result = fits.are_known()
-                 ? confirmed_by_points(result, features, map, method())
-                 : confirmed_at_start(result, features, map, has_prior_map || goes_on, method());
-    if (result.health == OdometryHealth::good && fits.is_contradicted_by_points(result))
-      result = moved_where_points_agree(result, features, map, method());
-    if (fits.are_known() && is_unvouched(result, prediction, fits))
-      result.health = OdometryHealth::degenerate;
-    keep_to_limits(last, prediction, !has_jumped, sensor.motion_limits, result);
-  }
+               OdometryResult& result) const;
   /// Calls a pose good only where the map says so that is older than any doubt of the place.
   void confirm_place(const FeatureSets& features, const PosePrediction& prediction,
                      OdometryResult& result);

@@ -90,21 +90,9 @@ bool agree(const OdometryResult& a, const OdometryResult& b) {
          difference.tail<3>().norm() < max_angle_rad;
 }
 
-std::size_t movable_points(const FeatureSets& features) {
-  return static_cast<std::size_t>(std::ranges::count_if(
-      features.points, [](const FeaturePoint& point) { return is_movable(point.label); }));
-}
-
 bool is_where_motion_led(const OdometryResult& found, const PosePrediction& prediction) {
   const PoseTangent off = boxminus(found.T_map_lidar, prediction.T_map_lidar);
   return off.head<3>().norm() < foretold_distance_m && off.tail<3>().norm() < foretold_angle_rad;
-}
-
-/// Whether enough is left of the scan without what could move by its label.
-bool labels_tell_enough(const FeatureSets& features, const OdometryConfig& config) {
-  constexpr std::size_t min_points = 100;
-  return config.weighting == Weighting::semantic &&
-         features.points.size() >= min_points + movable_points(features);
 }
 
 /// The best of several starts, by two witnesses: the features, and the points, whose values lie

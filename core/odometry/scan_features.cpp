@@ -297,4 +297,15 @@ LocalMap coarse_map_of_scan(const FeatureSets& features, const Eigen::Isometry3d
   return map;
 }
 
+std::size_t movable_points(const FeatureSets& features) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      features.points, [](const FeaturePoint& point) { return is_movable(point.label); }));
+}
+
+bool labels_tell_enough(const FeatureSets& features, const OdometryConfig& config) {
+  constexpr std::size_t min_points = 100;
+  return config.weighting == Weighting::semantic &&
+         features.points.size() >= min_points + movable_points(features);
+}
+
 }  // namespace stillmap

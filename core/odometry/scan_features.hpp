@@ -86,4 +86,10 @@ void extend_local_map(LocalMap& map, const FeatureSets& features,
 [[nodiscard]] LocalMap coarse_map_of_scan(const FeatureSets& features,
                                           const Eigen::Isometry3d& T_map_lidar);
 
+/// How many of the points that stand up could move by their labels.
+[[nodiscard]] std::size_t movable_points(const FeatureSets& features);
+
+/// Whether enough is left of the scan without what could move by its label.
+[[nodiscard]] bool labels_tell_enough(const FeatureSets& features, const OdometryConfig& config);
+
 }  // namespace stillmap
