@@ -304,7 +304,8 @@ void read_occupancy(YamlSection section, OccupancyServiceConfig& occupancy) {
   section.number("publish_period_s", occupancy.publish_period_s, periods_s);
 }
 
-LidarConfig read_lidar(YamlSection& section, const fs::path& folder) {
+LidarConfig read_lidar(YamlSection& section, const fs::path& folder,
+                       const PointFieldNames& fields) {
   LidarConfig lidar;
   section.require({"name", "sensor", "topic"});
   section.text("name", lidar.name);
@@ -320,6 +321,8 @@ LidarConfig read_lidar(YamlSection& section, const fs::path& folder) {
   section.text("topic", lidar.topic);
   section.text("frame", lidar.frame);
   check_frame(section, "frame", lidar.frame);
+  lidar.fields = fields;
+  read_fields(section.section("fields"), lidar.fields);
   lidar.T_base_lidar = read_extrinsic(section);
   // In counters, whose names are metrics' labels.
   const bool is_word = std::ranges::all_of(
@@ -347,7 +350,7 @@ void check_single_lidar_fields(YamlSection& file) {
 void read_lidars(YamlSection& file, const fs::path& folder, ServerConfig& config) {
   std::vector<LidarConfig>& lidars = config.lidars;
   file.sections("sensors", [&](YamlSection section) {
-    LidarConfig lidar = read_lidar(section, folder);
+    LidarConfig lidar = read_lidar(section, folder, config.input.fields);
     for (const LidarConfig& other : lidars) {
       if (lidar.name == other.name) section.fault("name", "two are called '" + lidar.name + "'");
       if (are_mixed_up(lidar, other)) {

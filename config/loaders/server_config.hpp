@@ -94,6 +94,8 @@ struct LidarConfig {
   std::string topic;
   /// header.frame_id of its clouds, where several lidars share a topic; empty: any.
   std::string frame;
+  /// Of its clouds; what its entry leaves out is as in InputConfig.
+  PointFieldNames fields{};
   Eigen::Isometry3d T_base_lidar = Eigen::Isometry3d::Identity();
 };
 

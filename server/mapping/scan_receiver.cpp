@@ -76,16 +76,15 @@ dds::TopicSpec<sensor_msgs::msg::PointCloud2> points_of(const ServerConfig& conf
   return dds::points_topic(ros_topic, config.input.delivery, waiting);
 }
 
-wire::CloudReadOptions reading_of(const ServerConfig& config, const SensorModel& sensor) {
-  const InputConfig& input = config.input;
-  PointFieldNames fields = input.fields;
+wire::CloudReadOptions reading_of(const ServerConfig& config, const SensorModel& sensor,
+                                  PointFieldNames fields) {
   // A field that nobody reads cannot be wrong.
   const bool reads_labels = config.labels.source == LabelProvider::automatic ||
                             config.labels.source == LabelProvider::stream;
   if (!reads_labels) fields.label.clear();
   return {.fields = std::move(fields),
           .intensity_scale = sensor.intensity_scale,
-          .labels_are_classes = input.label_kind == LabelKind::classes};
+          .labels_are_classes = config.input.label_kind == LabelKind::classes};
 }
 
 // By this machine's clock; 0 for a stamp that is not a time.
@@ -180,7 +179,8 @@ ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& co
             .name = "",
             .frame = "",
             .sensor = config.mapper.sensor,
-            .reader = wire::CloudReader(reading_of(config, config.mapper.sensor)),
+            .reader =
+                wire::CloudReader(reading_of(config, config.mapper.sensor, config.input.fields)),
             .recognition = config.automatic_sensor.is_on ? std::make_optional<SensorRecognition>()
                                                          : std::nullopt,
             .turns = TurnJoiner(config.input.clouds_per_turn)}},
@@ -229,7 +229,7 @@ std::vector<ScanReceiver::Lidar> ScanReceiver::lidars_on(const ServerConfig& con
                       .name = lidar.name,
                       .frame = lidar.frame,
                       .sensor = lidar.sensor,
-                      .reader = wire::CloudReader(reading_of(config, lidar.sensor)),
+                      .reader = wire::CloudReader(reading_of(config, lidar.sensor, lidar.fields)),
                       .turns = TurnJoiner(config.input.clouds_per_turn)});
   }
   return lidars;

@@ -153,6 +153,23 @@ TEST(ServerConfig, ReadsSeveralLidarsOfOneRobot) {
   EXPECT_EQ(config.mapper.sensor.pattern, ScanPattern::merged);
 }
 
+TEST(ServerConfig, OfSeveralLidarsEachMayHaveItsOwnFields) {
+  const std::string first =
+      "frames: {base: base_link}\ninput: {fields: {ring: [row]}}\n"
+      "sensors:\n  - {name: front, sensor: vlp_16, topic: front/points}\n"
+      "  - {name: rear, sensor: vlp_16, topic: rear/points, fields: ";
+  const ServerConfig config = load(first + "{y: [-y], time: [dt]}}\n");
+  ASSERT_EQ(config.lidars.size(), 2U);
+  EXPECT_THAT(config.lidars[0].fields.y, ::testing::ElementsAre("y"));
+  EXPECT_THAT(config.lidars[0].fields.ring, ::testing::ElementsAre("row"));
+  EXPECT_THAT(config.lidars[1].fields.y, ::testing::ElementsAre("-y"));
+  EXPECT_THAT(config.lidars[1].fields.time, ::testing::ElementsAre("dt"));
+  EXPECT_THAT(config.lidars[1].fields.ring, ::testing::ElementsAre("row"));
+  EXPECT_THAT(refusal_of(first + "{y: [-x]}}\n"),
+              AllOf(HasSubstr("sensors[1].fields.y"), HasSubstr("no two of them the same")));
+  EXPECT_THAT(refusal_of(first + "{rings: [row]}}\n"), HasSubstr("sensors[1].fields.rings"));
+}
+
 TEST(ServerConfig, RefusesLidarsThatCannotBeToldApart) {
   const std::string base = "frames: {base: base_link}\n";
   const std::string front = "{name: front, sensor: vlp_16, topic: points}";
