@@ -154,6 +154,11 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
   return lost_at(prediction.T_map_lidar);
 }
 
+void Odometry::State::choose_beginning(const PointLabels& labels) {
+  if (started || is_by_surfaces || has_prior_map || config.paper_exact) return;
+  is_by_surfaces = labels.empty() && !has_sparse_rings(sensor);
+}
+
 void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& prediction) const {
   parts.sparse_rings = is_by_surfaces && (has_sparse_rings(sensor) || is_map_young());
   if (!parts.scan.ring.empty())

@@ -100,6 +100,10 @@ struct Odometry::State {
                                        const std::optional<Eigen::Isometry3d>& T_map_lidar_known,
                                        bool is_prior,
                                        const std::optional<InertialMotion>& inertial) const;
+  /// Where a map begins: has a lidar whose rings are not far apart begin by surfaces if there are
+  /// no labels. In the open single rings hold little but the ground, on which they lie wherever the
+  /// lidar has gone. (With labels, of which a whole class may be wrong, a few surfaces are left.)
+  void choose_beginning(const PointLabels& labels);
   /// Finds features, objects and the range image of a scan, and what its objects do, seen from the
   /// predicted pose.
   void take_apart(ScanInParts& parts, const PosePrediction& prediction) const;

@@ -347,15 +347,17 @@ TEST_F(OdometrySequence, TheCovarianceOfALostLidarGrowsWithTheTime) {
 
 TEST_F(OdometrySequence, AFirstScanThatReplacesOneStaysOutOfTheMap) {
   Odometry odometry(OdometryConfig{}, test::test_lidar());
+  const test::BoxScan& seen_first = quiet().scans[0];
   const OdometryResult first =
-      test::register_scan(odometry, quiet().scans[0].scan, PointLabels{}, std::nullopt).result;
+      test::register_scan(odometry, seen_first.scan, seen_first.labels(), std::nullopt).result;
   ASSERT_EQ(first.health, OdometryHealth::initialised);
   EXPECT_TRUE(first.is_confirmed());
   // A street that stands on its side lies nowhere on that.
   const auto sideways = [&](std::size_t k) {
-    Scan scan = quiet().scans[k].scan;
+    const test::BoxScan& seen = quiet().scans[k];
+    Scan scan = seen.scan;
     for (Eigen::Vector3f& p : scan.points_lidar) p = Eigen::Vector3f(p.z(), p.x(), p.y());
-    return test::register_scan(odometry, scan, PointLabels{}, std::nullopt).result;
+    return test::register_scan(odometry, scan, seen.labels(), std::nullopt).result;
   };
   OdometryResult found = sideways(1);
   for (std::size_t k = 2; k < 6 && found.health == OdometryHealth::lost; ++k) found = sideways(k);

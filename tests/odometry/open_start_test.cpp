@@ -80,5 +80,40 @@ TEST(OpenStart, ALidarAtRestStaysWhereItIs) {
   EXPECT_LT(start.worst_begun_m, 0.001);
 }
 
+/// A bridge at 6 m/s: the road, rails along it with posts some 4 m apart, and pylons.
+double worst_on_bridge_m(const SensorModel& sensor) {
+  constexpr double speed_m_s = 6.0;
+  BoxWorld world;
+  world.noise_m = 0.02;
+  for (const double side : {-7.6, 7.6}) {
+    world.stand(0.0, side, {300.0, 0.08, 0.9}, SemanticClass::fence);
+    for (int post = -30; post <= 30; ++post)
+      world.stand(4.0 * post + 0.7 * ((post * post) % 5), side, {0.12, 0.12, 1.2},
+                  SemanticClass::fence);
+    for (int pylon = -4; pylon <= 4; ++pylon)
+      world.stand(31.0 * pylon + side, side + 0.1 * side, {0.3, 0.3, 9.0}, SemanticClass::pole);
+  }
+  OdometryConfig config;
+  config.weighting = Weighting::geometric;
+  Odometry odometry(config, sensor);
+  double worst_m = 0.0;
+  for (int k = 0; k < 15; ++k) {
+    const Eigen::Isometry3d T_map_lidar(Eigen::Translation3d(0.1 * speed_m_s * k, 0.0, 0.0));
+    Scan scan = world.scan(sensor, T_map_lidar, 0.1 * k).scan;
+    scan.labels.clear();
+    const OdometryResult found = register_scan(odometry, std::move(scan), {}).result;
+    worst_m =
+        std::max(worst_m, (found.T_map_lidar.translation() - T_map_lidar.translation()).norm());
+  }
+  return worst_m;
+}
+
+// Their rings hold the road alone, which lies on itself wherever the lidar has gone.
+TEST(OpenStart, OnABridgeManyRingsBeginBySurfaces) {
+  SensorModel sensor = test_lidar();
+  sensor.columns = 512;
+  EXPECT_LT(worst_on_bridge_m(sensor), 0.2);
+}
+
 }  // namespace
 }  // namespace stillmap::test
