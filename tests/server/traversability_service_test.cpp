@@ -30,6 +30,12 @@ PathQuery path_of(const std::string& profile, const std::vector<Eigen::Vector2d>
 /// A server that has mapped a hall with pillars and keeps the areas of two robots.
 class TraversabilityService : public testing::Test {
  protected:
+  /// Whether the server has the areas of the whole map. Before, on a busy machine, it computes
+  /// those of the region that is asked for, and knows of no others.
+  [[nodiscard]] bool is_kept() {
+    const SphereRegion elsewhere{.centre_map = {5e5, 0, 0}, .radius_m = 3};
+    return client_.get_traversable_area(query_of(elsewhere)).grid.reason != "the map is empty";
+  }
   TraversabilityService()
       : setup_("every"), server_(setup_.server_arguments()), client_(setup_.client()) {
     drive(publisher_, 0, 12);
@@ -38,7 +44,7 @@ class TraversabilityService : public testing::Test {
       const auto answer = client_.get_traversable_area(query_of(BoxRegion{}));
       // Version 0 is the map before it is published for the first time.
       return answer.grid.status == TraversabilityStatus::ok && answer.grid.map_version > 0 &&
-             answer.grid.map_version == client_.status().map_version;
+             answer.grid.map_version == client_.status().map_version && is_kept();
     }));
   }
 
