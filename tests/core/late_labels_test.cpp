@@ -132,7 +132,9 @@ TEST_P(LateLabels, MapAndPosesAreNearlyThoseOfLabelsInTime) {
   EXPECT_GT(propagated.share(), right_share);
   const auto reference = in_time.map_snapshot(), view = late.map_snapshot();
   EXPECT_GT(view->tiles.voxel_count(), reference->tiles.voxel_count() * 7 / 10);
-  EXPECT_GT(share_of_agreeing_voxels(*view, *reference), 0.975);
+  // Without labels its rings begin by surfaces, with them by edges and planes: the same to a
+  // centimetre or two.
+  EXPECT_GT(share_of_agreeing_voxels(*view, *reference), 0.97);
   for (const auto& tile : view->tiles) {
     for (const Voxel& voxel : tile->voxels) ASSERT_FALSE(is_movable(voxel.evidence.winner()));
   }
