@@ -39,6 +39,10 @@ LostLidarSearch::LostLidarSearch(const OdometryConfig& odometry, const SensorMod
                                  const Eigen::Isometry3d& T_body_lidar, MapView map)
     : odometry_(odometry), sensor_(sensor), T_body_lidar_(T_body_lidar), map_(std::move(map)) {}
 
+void LostLidarSearch::add_path(const Trajectory& path) {
+  for (const StampedPose& pose : path) path_.push_back(pose);
+}
+
 void LostLidarSearch::update(std::int64_t stamp_ns, const OdometryResult& odometry,
                              bool is_placed) {
   // What waits may enter the map.
@@ -46,7 +50,11 @@ void LostLidarSearch::update(std::int64_t stamp_ns, const OdometryResult& odomet
                          odometry.map_entry != MapEntry::stays_out_with_waiting;
   if (has_place) path_.push_back({stamp_ns, odometry.T_map_lidar * T_body_lidar_.inverse()});
   const bool is_due = watch_.is_due(stamp_ns, odometry, is_placed);
-  if (LostWatch::knows_place(odometry)) localization_.reset();
+  if (LostWatch::knows_place(odometry)) {
+    localization_.reset();
+    // It holds all tiles as they were, which would be in memory twice as the map goes on.
+    if (std::abs(stamp_ns - indexed_ns_) >= max_age_ns) localizer_.reset();
+  }
   if (!is_due || is_on() || found_ || map_()->tiles.empty()) return;
   index_map(stamp_ns);
   localization_.emplace(odometry_, sensor_);

@@ -47,6 +47,8 @@ class LostLidarSearch {
   LostLidarSearch(const OdometryConfig& odometry, const SensorModel& sensor,
                   const Eigen::Isometry3d& T_body_lidar, MapView map);
 
+  /// Where an earlier run that the map is of, too, led: poses of the body.
+  void add_path(const Trajectory& path);
   /// What became of the scan of this stamp: begins and ends searches.
   void update(std::int64_t stamp_ns, const OdometryResult& odometry, bool is_placed);
   /// Whether scans are looked for: follow() wants the next one.

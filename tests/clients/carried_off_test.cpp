@@ -8,7 +8,8 @@ namespace {
 
 class CarriedOffTest : public CommandTest {};
 
-// As where a recording was stopped, the robot carried, and the recording gone on with.
+// As where a recording was stopped, the robot carried, and the recording gone on with; what it is
+// carried to was mapped before the run itself was stopped.
 TEST_F(CarriedOffTest, IsFoundInTheMapThatItHasMade) {
   constexpr int carried_at = 230, carried_to = 10, scans = 310;
   const ProcessResult city =
@@ -28,10 +29,18 @@ TEST_F(CarriedOffTest, IsFoundInTheMapThatItHasMade) {
     copy("rings", ".bin", k - carried_at + carried_to, k);
   }
   std::filesystem::remove_all(folder_ / "city/labels");
-  const ProcessResult result =
-      run("map " + path("city") + " --out " + path("out") + " --labels none --json");
+  // A damaged file stops a run.
+  const std::string map = "map " + path("city") + " --labels none --strict --json --out ";
+  const std::filesystem::path damaged = folder_ / "city/velodyne/000200.bin";
+  std::filesystem::copy_file(damaged, folder_ / "scan");
+  std::filesystem::resize_file(damaged, 10);
+  ASSERT_EQ(run(map + path("out") + " --save-period 0.2").exit_code, 2);
+  std::filesystem::rename(folder_ / "scan", damaged);
+  const ProcessResult result = run(map + path("out") + " --resume");
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  const nlohmann::json found = nlohmann::json::parse(result.out).at("found_again_at_scans");
+  const nlohmann::json report = nlohmann::json::parse(result.out);
+  ASSERT_GT(report.at("resumed_at_scan"), 100) << "the way to where it is carried was mapped before";
+  const nlohmann::json found = report.at("found_again_at_scans");
   ASSERT_EQ(found.size(), 1U);
   EXPECT_GT(found.at(0), carried_at + 30) << "the mapper has three seconds to find it by itself";
   EXPECT_LT(found.at(0), carried_at + 60);

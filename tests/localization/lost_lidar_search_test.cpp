@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <numbers>
 
 #include "core/lidar/prepare.hpp"
@@ -109,6 +110,39 @@ TEST_F(LostInTheYard, IsNotLookedForOnceItsMapperHasFoundIt) {
   update(good);
   EXPECT_FALSE(search_.is_on());
   EXPECT_FALSE(follow(1, 5)) << "a search begins after some seconds";
+}
+
+TEST_F(LostInTheYard, IsLookedForWhereAnEarlierRunOfTheMapLed) {
+  const Trajectory& path = first_yard().trajectory;
+  const Eigen::Vector3d lost_at = path.back().T_map_lidar.translation();
+  const Eigen::Vector3d carried_to = path.at(95 / 4).T_map_lidar.translation();
+  ASSERT_GT((carried_to - lost_at).norm(), 20.0) << "else it is found beside where it was lost";
+  search_ = LostLidarSearch(OdometryConfig{}, yard(1, 1).sensor, Eigen::Isometry3d::Identity(),
+                            [] { return first_yard().view; });
+  search_.add_path(path);
+  OdometryResult there = good;
+  there.T_map_lidar = path.back().T_map_lidar;
+  update(there);
+  stay_lost();
+  EXPECT_TRUE(follow(1, 8));
+}
+
+// A map that goes on would be in memory twice, as it was then and as it is.
+TEST(LostLidarSearch, LetsTheMapGoThatItLookedInSomeSecondsAfterItWasFound) {
+  std::weak_ptr<const MapSnapshot> looked_in;
+  LostLidarSearch search(OdometryConfig{}, yard(1, 1).sensor, Eigen::Isometry3d::Identity(), [&] {
+    const auto view = std::make_shared<const MapSnapshot>(*first_yard().view);
+    looked_in = view;
+    return view;
+  });
+  search.update(100 * second_ns, good, true);
+  search.update(101 * second_ns, lost, true);
+  search.update(105 * second_ns, lost, true);
+  ASSERT_TRUE(search.is_on());
+  search.update(106 * second_ns, good, true);
+  EXPECT_FALSE(looked_in.expired()) << "it may soon be lost again";
+  search.update(116 * second_ns, good, true);
+  EXPECT_TRUE(looked_in.expired());
 }
 
 TEST_F(LostInTheYard, IsNotFoundInAnotherCity) {

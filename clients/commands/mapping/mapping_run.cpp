@@ -56,6 +56,7 @@ class MappingRun {
   void resume(RunState earlier) {
     mapper_.resume(earlier.map.view, earlier.map.tile_evidence);
     earlier_ = earlier.map.trajectory.to_vector();
+    search_.add_path(earlier_);
     if (earlier_.size() > 1)
       mapper_.go_on_from(earlier_[earlier_.size() - 2], earlier_.back(), T_body_lidar_);
     if (loops_) loops_->resume(earlier.next_scan, earlier.scan_of_pose.size());
