@@ -26,7 +26,8 @@ if(TARGET stillmap_python)
 endif()
 
 # The pages link to each other by their folders.
-foreach(page . core core/segmentation idl server clients clients/gateway config config/dds docker tests)
+foreach(page . core core/odometry core/segmentation idl server clients clients/gateway config config/dds docker
+        tests tests/drives tests/network tests/odometry tests/segmentation)
   install(FILES ${PROJECT_SOURCE_DIR}/${page}/README.md DESTINATION share/doc/stillmap/${page}
     COMPONENT tools)
 endforeach()

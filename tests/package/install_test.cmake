@@ -19,6 +19,25 @@ foreach(file bin/stillmap bin/stillmap-server
   endif()
 endforeach()
 
+# Pages lead to pages that were installed, too.
+file(GLOB_RECURSE pages ${PREFIX}/share/doc/stillmap/README.md)
+set(link_count 0)
+foreach(page ${pages})
+  file(READ ${page} text)
+  string(REGEX MATCHALL "\\([^() :#]*README\\.md" links "${text}")
+  get_filename_component(folder ${page} DIRECTORY)
+  foreach(link ${links})
+    string(SUBSTRING ${link} 1 -1 link)
+    math(EXPR link_count "${link_count} + 1")
+    if(NOT EXISTS ${folder}/${link})
+      message(FATAL_ERROR "${page} leads to ${link}, which was not installed")
+    endif()
+  endforeach()
+endforeach()
+if(link_count LESS 50)
+  message(FATAL_ERROR "only ${link_count} links between the pages were found")
+endif()
+
 # One network has a licence of its own.
 file(READ ${PREFIX}/share/doc/stillmap-data/copyright copyright)
 if(NOT copyright MATCHES "MIT License.*share/stillmap/models/kitti.*CC BY-NC-SA 4.0")
