@@ -68,12 +68,12 @@ struct PointTimes {
 /// Per-point times as drivers write them, converted to seconds relative to the scan's stamp.
 ///
 /// Drivers write offsets (Velodyne, Ouster) or absolute times (Hesai, RoboSense, Livox), in s, ms,
-/// us or ns. Integers are nanoseconds and others seconds, unless a scan would then take less than 1
-/// ms or more than 5 s and another unit makes it a revolution (5 ms to 5 s). The points' median
+/// us or ns. Integers are nanoseconds and others seconds, unless a scan would then take less than
+/// 1 ms or more than 5 s and another unit makes it a revolution (5 ms to 5 s). The points' median
 /// decides what is meant: those more than 10 s from it have no time (drivers write 0 where a packet
 /// was lost), and are not moved. Offsets within 1 s of zero are kept as they are. Larger values are
-/// absolute: the offset is then the distance to `stamp_ns` where that is the same clock (within 1
-/// s), else to the earliest point. A counter of 32 bits may begin anew within the scan. Absolute
+/// absolute: the offset is then the distance to `stamp_ns` where that is the same clock (within
+/// 1 s), else to the earliest point. A counter of 32 bits may begin anew within the scan. Absolute
 /// times in 32-bit floats are 128 s apart and therefore none.
 [[nodiscard]] PointTimes point_times(std::span<const double> times, TimeType type,
                                      std::int64_t stamp_ns);
