@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
 #include <string>
 
@@ -72,6 +73,31 @@ TEST(MisledScan, ThatTurnedWithoutAnotherBesideItIsRightOrAmbiguous) {
     EXPECT_LT(error.degrees, 2.0) << name(lone.motion);
   }
   EXPECT_GE(found, 4);
+}
+
+// A blow turns the lidar amid its sweep: no steady motion explains the scan, and its stamp may be
+// before the blow or after it.
+TEST(MisledScan, ThatBendsByNoSteadyMotionIsAmbiguousThoughItWasFound) {
+  constexpr double duration_s = 0.1, part_before = 0.5, turn_deg = 12.0;
+  const Localizer localizer(index_of(first_yard()));
+  Scan scan =
+      drop_unusable_points(simulation::Simulation(yard(1, 1)).scan(69).scan, PrepareConfig{});
+  const Eigen::Matrix3f R_before_after =
+      Eigen::AngleAxisd(turn_deg * rad_per_deg, Eigen::Vector3d::UnitZ())
+          .toRotationMatrix()
+          .cast<float>();
+  scan.time_offset_s.clear();
+  for (Eigen::Vector3f& p : scan.points_lidar) {
+    const double part = 0.5 + std::atan2(p.y(), p.x()) / (2.0 * std::numbers::pi);
+    scan.time_offset_s.push_back(static_cast<float>(duration_s * (part - 0.5)));
+    if (part > part_before) p = R_before_after * p;
+  }
+  const PointLabels labels = labels_of(scan);
+  const Eigen::Matrix3d R_body_lidar = Eigen::Matrix3d::Identity();
+  const StampedLocalization lone =
+      localize_lone_scan(localizer, scan, labels, R_body_lidar, duration_s);
+  EXPECT_EQ(lone.motion, SweepMotionSource::unknown);
+  EXPECT_EQ(lone.result.status, LocalizationStatus::ambiguous);
 }
 
 }  // namespace
