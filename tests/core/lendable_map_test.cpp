@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <string>
+#include <utility>
 
 namespace stillmap {
 namespace {
@@ -91,6 +93,22 @@ TEST(LendableMap, ScansThatAreKeptAreOfTheLidarThatTookThem) {
     EXPECT_GT(told.before.before_wall, 100U);
     EXPECT_LT(told.after.before_wall, told.before.before_wall / 2) << "they saw through it";
     EXPECT_EQ(told.after, seen(false, wait).after);
+  }
+}
+
+TEST(LendableMap, ScansThatWaitedEnterLaterWhereThatIsSaidOrTheMapIsLent) {
+  for (const auto& [later, is_lent] : {std::pair{false, false}, {true, false}, {false, true}}) {
+    SCOPED_TRACE(std::string(later ? "later" : "now") + (is_lent ? ", lent" : ""));
+    LendableMap map({}, hdl_64e());
+    map.let_wait(looking_ahead(1, 20.0, false), Eigen::Isometry3d::Identity());
+    if (is_lent) static_cast<void>(map.lend());
+    EXPECT_EQ(map.decide_waiting(MapEntry::enters_with_waiting, later), 1U);
+    EXPECT_EQ(map.confirmed_scans(), later || is_lent ? 1U : 0U);
+    if (is_lent) map.reclaim();
+    EXPECT_EQ(voxels_of(map).all > 0, !later && !is_lent);
+    map.insert_confirmed();
+    EXPECT_EQ(map.confirmed_scans(), 0U);
+    EXPECT_GT(voxels_of(map).all, 100U);
   }
 }
 

@@ -199,7 +199,9 @@ TEST(NewLines, AreOnceEachAndForgottenWhenThereAreMany) {
   NewLines lines;
   EXPECT_TRUE(lines.add("first"));
   EXPECT_FALSE(lines.add("first"));
-  for (std::size_t i = 0; i < NewLines::max_lines; ++i) EXPECT_TRUE(lines.add(std::to_string(i)));
+  for (std::size_t i = 1; i < NewLines::max_lines; ++i) EXPECT_TRUE(lines.add(std::to_string(i)));
+  EXPECT_FALSE(lines.add("first"));
+  EXPECT_TRUE(lines.add("one more"));
   EXPECT_TRUE(lines.add("first"));
 }
 

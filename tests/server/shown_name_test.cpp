@@ -9,8 +9,11 @@ namespace {
 
 TEST(ShownName, LeavesNamesAsTheyAre) {
   const std::string longest(100, 'x');
-  for (const std::string& name : {std::string(), std::string("base_link"),
-                                  std::string("front/v\u00e9lo \U0001F916"), longest}) {
+  for (const std::string& name :
+       {std::string(), std::string("base_link"), std::string("front/v\u00e9lo \U0001F916"), longest,
+        // The last before the surrogates, the last of all, and the first
+        // of three and of four bytes.
+        std::string("\uD7FF\U0010FFFF\u0800\U00010000")}) {
     EXPECT_EQ(shown_name(name), name);
   }
 }
