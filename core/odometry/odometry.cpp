@@ -64,8 +64,8 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
 
   // Features F_e and F_p, without those on objects that may be moving.
   ScanInParts parts{.scan = scan, .sweep = sweep, .labels = labels};
-  state.choose_beginning(labels);
   state.take_apart(parts, prediction);
+  state.choose_beginning(parts, prediction);
   parts.sweep_prior = state.sweep_prior(time_ns, sweep, expected_motion);
 
   // Pose against the local map, eq. (5)-(13), at the middle of the sweep.

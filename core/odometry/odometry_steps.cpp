@@ -36,6 +36,9 @@ constexpr double max_disagreement_rad = 0.01;
 /// Points of a ring to either side among which its direction is sought where walls are near: 0.3 m
 /// from one 2 m away, at a fifth of a degree each.
 constexpr std::size_t steps_on_near_walls = 40;
+/// Where fewer points stand up, the lidar is in the open. Of evenly spread ones, 800 at most,
+/// motorways, bridges and lawns leave 160 to 310, streets and squares all.
+constexpr std::size_t few_upright_points = 400;
 
 /// How far off the rings of a lidar, where they are closest, lie as far apart as the neighbours of
 /// a point may [m].
@@ -154,11 +157,6 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
   return lost_at(prediction.T_map_lidar);
 }
 
-void Odometry::State::choose_beginning(const PointLabels& labels) {
-  if (started || is_by_surfaces || has_prior_map || config.paper_exact) return;
-  is_by_surfaces = labels.empty() && !has_sparse_rings(sensor);
-}
-
 void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& prediction) const {
   parts.sparse_rings = is_by_surfaces && (has_sparse_rings(sensor) || is_map_young());
   if (!parts.scan.ring.empty())
@@ -187,6 +185,14 @@ void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& predi
   parts.motion_classes = classify(parts, prediction.T_map_lidar);
   find_upright_tangents(parts, config);
   parts.movable = movable;
+}
+
+void Odometry::State::choose_beginning(ScanInParts& parts, const PosePrediction& prediction) {
+  if (started || is_by_surfaces || has_prior_map || config.paper_exact || has_sparse_rings(sensor))
+    return;
+  if (!parts.labels.empty() && parts.features.upright_points.size() >= few_upright_points) return;
+  is_by_surfaces = true;
+  take_apart(parts, prediction);
 }
 
 OdometryResult Odometry::State::find_pose(ScanInParts& parts, const PosePrediction& prediction,

@@ -100,13 +100,14 @@ struct Odometry::State {
                                        const std::optional<Eigen::Isometry3d>& T_map_lidar_known,
                                        bool is_prior,
                                        const std::optional<InertialMotion>& inertial) const;
-  /// Where a map begins: has a lidar whose rings are not far apart begin by surfaces if there are
-  /// no labels. In the open single rings hold little but the ground, on which they lie wherever the
-  /// lidar has gone. (With labels, of which a whole class may be wrong, a few surfaces are left.)
-  void choose_beginning(const PointLabels& labels);
   /// Finds features, objects and the range image of a scan, and what its objects do, seen from the
   /// predicted pose.
   void take_apart(ScanInParts& parts, const PosePrediction& prediction) const;
+  /// Where a map begins: takes a scan apart again, into surfaces, if the rings are not far apart
+  /// and there are no labels, or little stands up. In the open single rings hold little but the
+  /// ground, on which they lie wherever the lidar has gone. (Where much stands up, and a whole
+  /// class of labels may be wrong, edges are the surer ones.)
+  void choose_beginning(ScanInParts& parts, const PosePrediction& prediction);
   /// The pose, and the features that it was found by: few of them where these fit.
   [[nodiscard]] OdometryResult find_pose(ScanInParts& parts, const PosePrediction& prediction,
                                          FeatureSets& features) const;
