@@ -39,6 +39,9 @@ constexpr std::size_t steps_on_near_walls = 40;
 /// Where fewer points stand up, the lidar is in the open. Of evenly spread ones, 800 at most,
 /// motorways, bridges and lawns leave 160 to 310, streets and squares all.
 constexpr std::size_t few_upright_points = 400;
+/// And on smooth ground where rings have so many planes to an edge: motorways and bridges 4.3 to
+/// 15, snow and lawns, whose bumps do hold the lidar, at most 2.
+constexpr std::size_t smooth_planes_per_edge = 3;
 
 /// How far off the rings of a lidar, where they are closest, lie as far apart as the neighbours of
 /// a point may [m].
@@ -188,9 +191,13 @@ void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& predi
 }
 
 void Odometry::State::choose_beginning(ScanInParts& parts, const PosePrediction& prediction) {
-  if (started || is_by_surfaces || has_prior_map || config.paper_exact || has_sparse_rings(sensor))
-    return;
-  if (!parts.labels.empty() && parts.features.upright_points.size() >= few_upright_points) return;
+  if (started || is_by_surfaces || has_prior_map || config.paper_exact) return;
+  const bool is_sparse = has_sparse_rings(sensor);
+  if (!parts.labels.empty() || is_sparse) {
+    const Features& rings = parts.features;
+    if (rings.upright_points.size() >= few_upright_points) return;
+    if (is_sparse && rings.planes.size() < smooth_planes_per_edge * rings.edges.size()) return;
+  }
   is_by_surfaces = true;
   take_apart(parts, prediction);
 }

@@ -104,9 +104,10 @@ struct Odometry::State {
   /// predicted pose.
   void take_apart(ScanInParts& parts, const PosePrediction& prediction) const;
   /// Where a map begins: takes a scan apart again, into surfaces, if the rings are not far apart
-  /// and there are no labels, or little stands up. In the open single rings hold little but the
-  /// ground, on which they lie wherever the lidar has gone. (Where much stands up, and a whole
-  /// class of labels may be wrong, edges are the surer ones.)
+  /// and there are no labels, or little stands up, or if they are far apart, little stands up and
+  /// the ground is smooth. In the open single rings hold little but the ground, on which they lie
+  /// wherever the lidar has gone. (Where much stands up, and a whole class of labels may be wrong,
+  /// edges are the surer ones.)
   void choose_beginning(ScanInParts& parts, const PosePrediction& prediction);
   /// The pose, and the features that it was found by: few of them where these fit.
   [[nodiscard]] OdometryResult find_pose(ScanInParts& parts, const PosePrediction& prediction,

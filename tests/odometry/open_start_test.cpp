@@ -117,5 +117,10 @@ TEST(OpenStart, OnABridgeManyRingsBeginBySurfaces) {
   EXPECT_LT(worst_on_bridge_m(sensor, Weighting::semantic), 0.2) << "with labels";
 }
 
+TEST(OpenStart, OnABridgeSixteenRingsBeginBySurfaces) {
+  EXPECT_LT(worst_on_bridge_m(sixteen_rings(), Weighting::geometric), 0.2);
+  EXPECT_LT(worst_on_bridge_m(sixteen_rings(), Weighting::semantic), 0.2) << "with labels";
+}
+
 }  // namespace
 }  // namespace stillmap::test
