@@ -80,10 +80,8 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   state.confirm_place(features, prediction, step.result);
   state.begin_anew(features, step.result);
   step.result = doubted_where_pulled(step.result, features, state.map, state.config);
-  if (state.fits.are_known()) {
-    step.result = doubted_where_shift_fits(step.result, features, state.map, state.method());
-    step.result = state.flat_fit.doubted(step.result, features, state.map, state.method());
-  }
+  step.result = doubted_where_shift_fits(step.result, features, state.map, state.method());
+  step.result = state.flat_fit.doubted(step.result, features, state.map, state.method());
   state.straighten(features, time_ns, sweep, step.result);
   step.T_map_lidar_middle = step.result.T_map_lidar;
   move_to_middle(scan, sweep, step.result.sweep_correction);

@@ -122,5 +122,31 @@ TEST(OpenStart, OnABridgeSixteenRingsBeginBySurfaces) {
   EXPECT_LT(worst_on_bridge_m(sixteen_rings(), Weighting::semantic), 0.2) << "with labels";
 }
 
+// What little of rough walls seems to stand across the way is noise, by the first scans, too.
+TEST(OpenStart, BetweenRoughWallsFirstScansThatSlideAreNotCalledGood) {
+  BoxWorld world;
+  world.noise_m = 0.13;
+  for (const double side : {-3.0, 3.0})
+    world.stand(0.0, side, {400.0, 0.5, 4.0}, SemanticClass::building);
+  OdometryConfig config;
+  config.weighting = Weighting::geometric;
+  Odometry odometry(config, test_lidar());
+  int off = 0;
+  int good_though_off = 0;
+  for (int k = 0; k < 10; ++k) {
+    const double x_m = 0.4 * k;
+    const Eigen::Isometry3d T_map_lidar(Eigen::Translation3d(x_m, 0.0, 0.0));
+    Scan scan = world.scan(test_lidar(), T_map_lidar, 0.1 * k).scan;
+    scan.labels.clear();
+    const OdometryResult found = register_scan(odometry, std::move(scan), {}).result;
+    const bool is_off = std::abs(found.T_map_lidar.translation().x() - x_m) > 0.3;
+    off += is_off ? 1 : 0;
+    good_though_off += is_off && found.health == OdometryHealth::good ? 1 : 0;
+  }
+  EXPECT_GE(off, 8);
+  // Eight without asking; one scan alone may be chance.
+  EXPECT_LE(good_though_off, 3);
+}
+
 }  // namespace
 }  // namespace stillmap::test
