@@ -305,7 +305,7 @@ bool is_at_goal(const PlanarPose& start, const Goal& to) {
 
 std::optional<PathPlan> refusal(const TraversabilityView& view, const Goal& from, const Goal& to) {
   using enum PlanStatus;
-  if (view.tiles.empty()) return failed(view, no_path, "the map is empty");
+  if (view.tiles.empty()) return failed(view, no_path, TraversabilityView::nothing_known);
   const std::string from_fault = fault_of(view, from);
   if (!from_fault.empty()) return failed(view, invalid_request, "start: " + from_fault);
   const std::string to_fault = fault_of(view, to);

@@ -190,7 +190,8 @@ OccupancyGrid occupancy_grid(const TraversabilityView& view, const Traversabilit
     return refused(TraversabilityStatus::invalid_request,
                    text_of(asked) + ": each minimum must be a number not above its maximum");
   }
-  if (view.tiles.empty()) return refused(TraversabilityStatus::not_found, "the map is empty");
+  if (view.tiles.empty())
+    return refused(TraversabilityStatus::not_found, TraversabilityView::nothing_known);
   const Eigen::AlignedBox2d box_map = asked.intersection(view.bounds_map());
   if (box_map.isEmpty()) {
     return refused(TraversabilityStatus::not_found,

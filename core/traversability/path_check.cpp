@@ -67,7 +67,8 @@ std::optional<PathCheck> refusal(const TraversabilityView& view,
                                  std::span<const PlanarPose> path_map) {
   if (path_map.empty())
     return refused(TraversabilityStatus::invalid_request, "the path has no poses");
-  if (view.tiles.empty()) return refused(TraversabilityStatus::not_found, "the map is empty");
+  if (view.tiles.empty())
+    return refused(TraversabilityStatus::not_found, TraversabilityView::nothing_known);
   for (std::size_t i = 0; i < path_map.size(); ++i) {
     const std::string fault = fault_of(view, path_map[i], i);
     if (!fault.empty()) return refused(TraversabilityStatus::invalid_request, fault);

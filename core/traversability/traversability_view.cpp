@@ -346,7 +346,8 @@ std::string_view name(TraversabilityStatus status) {
 
 NearestTraversable nearest_traversable(const TraversabilityView& view,
                                        const Eigen::Vector2d& position_map, double max_distance_m) {
-  if (view.tiles.empty()) return refused(TraversabilityStatus::not_found, "the map is empty");
+  if (view.tiles.empty())
+    return refused(TraversabilityStatus::not_found, TraversabilityView::nothing_known);
   std::ostringstream place;
   place << "(" << position_map.x() << ", " << position_map.y() << ")";
   std::ostringstream text;

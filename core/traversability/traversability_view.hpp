@@ -104,6 +104,11 @@ struct CellIndex {
 
 /// Immutable snapshot of the traversability for one robot; safe to read from any thread.
 struct TraversabilityView {
+  /// Why one without tiles tells nothing. Where those of the whole map are not worked out yet, a
+  /// view holds what is near the region that was asked for alone.
+  static constexpr const char* nothing_known =
+      "no area is known yet: the map is empty, or its areas are still being worked out";
+
   /// Version of the map that it was computed from.
   std::uint64_t version = 0;
   std::uint64_t map_id = 0;

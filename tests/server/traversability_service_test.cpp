@@ -34,7 +34,8 @@ class TraversabilityService : public testing::Test {
   /// those of the region that is asked for, and knows of no others.
   [[nodiscard]] bool is_kept() {
     const SphereRegion elsewhere{.centre_map = {5e5, 0, 0}, .radius_m = 3};
-    return client_.get_traversable_area(query_of(elsewhere)).grid.reason != "the map is empty";
+    return client_.get_traversable_area(query_of(elsewhere)).grid.reason !=
+           TraversabilityView::nothing_known;
   }
   TraversabilityService()
       : setup_("every"), server_(setup_.server_arguments()), client_(setup_.client()) {
